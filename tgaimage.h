@@ -1,0 +1,65 @@
+// tgaimage.h: a picture in memory and its file, Truevision TGA 2.0. It knows nothing of triangles.
+//
+// Pixels are addressed with (0,0) at the bottom left, whatever order the file has them in. Channels are stored in the
+// file's order: blue, green, red, alpha; a grey picture has one channel.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+struct TGAColor {
+    std::uint8_t bgra[4] = {0, 0, 0, 0};
+    constexpr std::uint8_t& operator[](int i) { return bgra[i]; }
+    constexpr const std::uint8_t& operator[](int i) const { return bgra[i]; }
+};
+
+class TGAImage {
+public:
+    enum Format { GRAYSCALE = 1, RGB = 3, RGBA = 4 };  // the value is the number of bytes in a pixel
+
+    TGAImage() = default;                              // no picture: 0 x 0
+    TGAImage(int width, int height, Format format);    // all bytes 0; 1 to 65535 pixels a side, or std::invalid_argument
+
+    // Reads types 1, 2, 3, 9, 10, 11 at 8, 15, 16, 24 and 32 bits, all four origins, with or without image ID, colour map
+    // and 2.0 footer. A colour-mapped picture comes out in the format of its map; 15 and 16 bits become RGB (RGBA where
+    // the header declares an attribute bit), five bits scaled to eight.
+    // Throws std::runtime_error "FILE: what" or "FILE: byte N: what". Allocates at most 256 times the size of the file,
+    // which is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map), and 64 KiB.
+    static TGAImage read_tga_file(const std::filesystem::path& path);
+
+    // Writes the picture with the top row first and the 2.0 footer, run-length encoded or not. The bytes go to a temporary
+    // file beside PATH that is then renamed, so PATH is either the old picture or the new one, never half of one.
+    // Throws std::runtime_error "FILE: what", with the temporary file removed.
+    void write_tga_file(const std::filesystem::path& path, bool rle = true) const;
+
+    int width() const { return w_; }
+    int height() const { return h_; }
+    int bytespp() const { return bpp_; }
+    bool empty() const { return data_.empty(); }
+
+    // Outside the picture get() is all zeros and set() does nothing.
+    TGAColor get(int x, int y) const {
+        TGAColor c;
+        if (!inside(x, y)) return c;
+        for (int i = 0; i < bpp_; i++) c[i] = pixel(x, y)[i];
+        return c;
+    }
+    void set(int x, int y, const TGAColor& c) {
+        if (!inside(x, y)) return;
+        for (int i = 0; i < bpp_; i++) pixel(x, y)[i] = c[i];
+    }
+
+    // The bytes of the pixel (x,y), unchecked; the next pixel of the row is bytespp() further, the row above width() pixels.
+    std::uint8_t* pixel(int x, int y) { return data_.data() + offset(x, y); }
+    const std::uint8_t* pixel(int x, int y) const { return data_.data() + offset(x, y); }
+
+private:
+    bool inside(int x, int y) const { return x >= 0 && y >= 0 && x < w_ && y < h_; }
+    std::size_t offset(int x, int y) const {
+        return (static_cast<std::size_t>(y) * static_cast<std::size_t>(w_) + static_cast<std::size_t>(x)) *
+               static_cast<std::size_t>(bpp_);
+    }
+
+    int w_ = 0, h_ = 0, bpp_ = 0;
+    std::vector<std::uint8_t> data_;  // rows from the bottom up
+};
