@@ -1,0 +1,73 @@
+// model.h: an .obj with its materials and textures, ready to be drawn. It knows nothing of cameras.
+//
+// Faces are triangles after loading: polygons are cut (concave ones correctly), and faces are sorted, stably, by material.
+#pragma once
+#include "geometry.h"
+#include "tgaimage.h"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+// What a surface is made of. A map that is not there is an empty picture; where one is there the shader uses it.
+// All but the specular map have three or four channels: a grey picture is widened, a grey normal map left out.
+struct Material {
+    std::string name;
+    vec3 Kd{1, 1, 1};   // diffuse reflectance, red green blue in [0,1]; it multiplies the diffuse texel
+    TGAImage diffuse;   // NAME_diffuse.tga or map_Kd
+    TGAImage normal;    // NAME_nm.tga: object space, (r,g,b) = (x,y,z) from [0,255] to [-1,1]
+    TGAImage tangent;   // NAME_nm_tangent.tga, norm or map_Bump: tangent space
+    TGAImage specular;  // NAME_spec.tga or map_Ks: the Phong exponent, first channel
+    TGAImage glow;      // NAME_glow.tga or map_Ke: added after shading
+};
+
+// Which normal map is wanted where a model has one in object space and one in tangent space: only that one is decoded.
+// Where it has only the other kind, that is taken.
+enum class NormalMap { object, tangent };
+
+class Model {
+public:
+    struct Corner {  // indices from 0 into the model's arrays; uv is -1 where the file gives none
+        int vert, uv, normal;
+    };
+    struct Group {  // the faces [begin,end) share a material
+        int begin, end, material;
+    };
+
+    Model() = default;
+
+    // Reads an .obj and the textures beside it. Throws std::runtime_error "FILE:LINE: what" (LINE counts from 1),
+    // "FILE: what" for a file that cannot be read or has no face, and what TGAImage::read_tga_file throws.
+    // Memory is bounded by a constant times the size of the files, plus 1 GiB for pictures that several materials share
+    // (each has its own copy; more than that is an error). Textures are not decoded for faces without texture coordinates.
+    explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
+
+    // What the user may want to know and is no error, one line each without the file's name at its head.
+    const std::vector<std::string>& notes() const { return notes_; }
+
+    int nverts() const { return static_cast<int>(verts_.size()); }
+    int nfaces() const { return static_cast<int>(corners_.size() / 3); }
+    const Corner& corner(int face, int c) const { return corners_[static_cast<std::size_t>(face) * 3 + static_cast<std::size_t>(c)]; }
+    const std::vector<vec3>& verts() const { return verts_; }
+    const vec3& vert(int face, int c) const { return verts_[static_cast<std::size_t>(corner(face, c).vert)]; }
+    const vec3& normal(int face, int c) const { return normals_[static_cast<std::size_t>(corner(face, c).normal)]; }  // unit
+    vec2 uv(int face, int c) const {  // (0,0) where the file gives none; v points up
+        const int i = corner(face, c).uv;
+        return i < 0 ? vec2{} : uvs_[static_cast<std::size_t>(i)];
+    }
+
+    const std::vector<Material>& materials() const { return materials_; }
+    const std::vector<Group>& groups() const { return groups_; }
+
+    // Moves the centre of the bounding box of the used vertices to the origin and scales uniformly so that its largest
+    // half-side is 1, if the box is not within [-1,1]^3 already. Returns whether it did.
+    bool fit();
+
+private:
+    std::vector<vec3> verts_, normals_;
+    std::vector<vec2> uvs_;
+    std::vector<Corner> corners_;  // three a face
+    std::vector<Material> materials_;
+    std::vector<Group> groups_;
+    std::vector<std::string> notes_;
+};

@@ -1,0 +1,1098 @@
+// model_test.cpp: what model.cpp promises about real .obj and .mtl files, polygons, normals, textures and fitting.
+// Every file it reads it writes first, into a fresh folder that it removes at the end.
+#include "check.h"
+#include "files.h"
+#include "model.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// ---- files ----
+
+class Folder : public TemporaryFolder {
+public:
+    Folder() : TemporaryFolder("model_test") {}
+
+    std::filesystem::path write(const std::string& name, const std::string& text) const {
+        write_bytes(*this / name, Bytes(text.begin(), text.end()));
+        return *this / name;
+    }
+    // A picture of one colour: its first channel tells which file it came from.
+    void picture(const std::string& name, int first_channel, TGAImage::Format format = TGAImage::RGB, int side = 2) const {
+        TGAImage image(side, side, format);
+        TGAColor color;
+        for (int i = 0; i < 4; i++) color[i] = static_cast<std::uint8_t>(first_channel + i);
+        for (int y = 0; y < side; y++)
+            for (int x = 0; x < side; x++) image.set(x, y, color);
+        image.write_tga_file(*this / name);
+    }
+};
+
+Model load(const std::string& text) {
+    const Folder folder;
+    return Model(folder.write("model.obj", text));
+}
+
+// ---- what is looked at ----
+
+// The faces as text: "0/4 1/5 2/-1, ...", vertex and texture index of each corner.
+std::string faces(const Model& m) {
+    std::string out;
+    for (int f = 0; f < m.nfaces(); f++)
+        for (int c = 0; c < 3; c++) {
+            const Model::Corner& k = m.corner(f, c);
+            out += (c ? " " : f ? ", " : "") + std::to_string(k.vert) + (k.uv < 0 ? "" : "/" + std::to_string(k.uv));
+        }
+    return out;
+}
+std::string faces(const std::string& text) { return faces(load(text)); }
+
+std::string text(const vec3& v) { return shown(v.x) + " " + shown(v.y) + " " + shown(v.z); }
+std::string normals(const Model& m, int face) {
+    return text(m.normal(face, 0)) + ", " + text(m.normal(face, 1)) + ", " + text(m.normal(face, 2));
+}
+std::string notes(const Model& m) {
+    std::string out;
+    for (const std::string& note : m.notes()) out += note + "\n";
+    return out;
+}
+int first(const TGAImage& image) { return image.empty() ? -1 : image.get(0, 0)[0]; }
+
+bool finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+// What holds for every model, whatever the file.
+void check_invariants(const Model& m) {
+    CHECK(m.nfaces() > 0);
+    bool indices = true, units = true, numbers = true;
+    for (const vec3& v : m.verts()) numbers = numbers && finite(v);
+    for (int f = 0; f < m.nfaces(); f++)
+        for (int c = 0; c < 3; c++) {
+            const Model::Corner& k = m.corner(f, c);
+            indices = indices && k.vert >= 0 && k.vert < m.nverts() && k.uv >= -1 && k.normal >= 0;
+            numbers = numbers && std::isfinite(m.uv(f, c).x) && std::isfinite(m.uv(f, c).y);
+            // Three squares, two sums, a root and a division, each off by half an epsilon at most.
+            units = units && std::fabs(norm(m.normal(f, c)) - 1) <= 4 * std::numeric_limits<double>::epsilon();
+        }
+    CHECK(indices);
+    CHECK(numbers);
+    CHECK(units);
+    int face = 0, material = -1;
+    for (const Model::Group& g : m.groups()) {
+        CHECK_EQ(g.begin, face);
+        CHECK(g.end > g.begin);
+        CHECK(g.material > material);
+        face = g.end;
+        material = g.material;
+    }
+    CHECK_EQ(face, m.nfaces());
+    CHECK_EQ(m.groups().size(), m.materials().size());
+    for (const Material& each : m.materials())
+        for (const TGAImage* map : {&each.diffuse, &each.normal, &each.tangent, &each.glow})
+            CHECK(map->empty() || map->bytespp() >= 3);
+}
+
+const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+const std::string extras = "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nvn 0 1 0\nvn 1 0 0\n";
+
+}  // namespace
+
+// ---- corners ----
+
+TEST("a corner may be v, v/vt, v//vn or v/vt/vn, each by itself") {
+    CHECK_EQ(faces(square + extras + "f 1 2 3\n"), "0 1 2");
+    CHECK_EQ(faces(square + extras + "f 1/3 2/2 3/1\n"), "0/2 1/1 2/0");
+    const Model normals_only = load(square + extras + "f 1//1 2//2 3//3\n");
+    CHECK_EQ(faces(normals_only), "0 1 2");
+    CHECK_EQ(normals(normals_only, 0), "0 0 1, 0 1 0, 1 0 0");
+    const Model all = load(square + extras + "f 1/3/3 2/2/2 3/1/1\n");
+    CHECK_EQ(faces(all), "0/2 1/1 2/0");
+    CHECK_EQ(normals(all, 0), "1 0 0, 0 1 0, 0 0 1");
+    const Model mixed = load(square + extras + "f 1 2/2 3//3\nf 2/1/3 3/ 4//\n");
+    check_invariants(mixed);
+    CHECK_EQ(faces(mixed), "0 1/1 2, 1/0 2 3");
+    CHECK_EQ(text(mixed.normal(0, 2)), "1 0 0");
+    CHECK_EQ(text(mixed.normal(0, 0)), "0 0 1");  // none given
+    CHECK_EQ(text(mixed.normal(1, 0)), "1 0 0");
+    CHECK_EQ(mixed.uv(0, 1).x, 1);
+    CHECK(mixed.uv(0, 0) == vec2{});
+}
+
+TEST("negative indices count back from what is defined so far") {
+    CHECK_EQ(faces(square + "f -4 -3 -2\nv 2 2 2\nf -1 -2 -5\n"), "0 1 2, 4 3 0");
+    CHECK_EQ(faces(square + extras + "f -4/-1/-1 2/-3 -2\n"), "0/2 1/0 2");
+}
+
+TEST("positive indices may look ahead") {
+    CHECK_EQ(faces("f 1/1 2/2 3/1\n" + square + extras), "0/0 1/1 2/0");
+    CHECK_EQ(normals(load("f 1//1 2//1 3//1\n" + square + extras), 0), "0 0 1, 0 0 1, 0 0 1");
+}
+
+TEST("quads and polygons become triangles that wind alike") {
+    CHECK_EQ(faces(square + "f 1 2 3 4\n"), "0 1 2, 0 2 3");
+    CHECK_EQ(faces(square + "f 4 3 2 1\n"), "3 2 1, 3 1 0");
+    CHECK_EQ(faces(square + "v .5 1.5 0\nf 1 2 3 5 4\n"), "0 1 2, 0 2 4, 0 4 3");
+    CHECK_EQ(faces(square + extras + "f 1/1 2/2 3/3 4/2\n"), "0/0 1/1 2/2, 0/0 2/2 3/1");
+}
+
+// ---- lines ----
+
+TEST("lines may end in CRLF") {
+    CHECK_EQ(faces("v 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nvt 0 0\r\nf 1/1 2/1 \\\r\n3/1\r\n"), "0/0 1/0 2/0");
+    CHECK_THROWS(load("v 0 0 0\r\n\r\nf 1 1 2\r\n"), "model.obj:3:");
+}
+
+TEST("tabs and leading blanks do not matter") {
+    CHECK_EQ(faces("\tv\t0 0\t\t0\n  v 1  0 0 \n \t v 1 1 0\t\n   f  1\t2   3  \n"), "0 1 2");
+}
+
+TEST("comments may stand anywhere, and do not continue") {
+    const Model m = load("# a head\nv 0 0 0 # origin\nv 1 0 0#near\n  # \\\nv 1 1 0\nf 1 2 3 # a face \\\nf 3 2 1#\n#");
+    CHECK_EQ(m.nverts(), 3);
+    CHECK_EQ(faces(m), "0 1 2, 2 1 0");
+}
+
+TEST("a backslash at the end continues a line, and lines are still counted right") {
+    CHECK_EQ(faces("v 0 \\\n0 0\nv\\\n1 0 0\nv 1 1\\\n 0\nf 1 \\\n\\\n 2\\  \n 3\n"), "0 1 2");
+    CHECK_EQ(faces("o one \\\nf 1 1 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\\"), "0 1 2");
+    CHECK_EQ(faces(square + "f 1 2 3 \\"), "0 1 2");
+    CHECK_EQ(faces(square + "f 1 2 3 \\\n\\\n"), "0 1 2");
+    CHECK_THROWS(load("v 0 0 \\\n 0\nv 1 0 0\nv x 1 1\n"), "model.obj:4: 'x' is no number");
+    CHECK_THROWS(load("v 0 0 \\\n 0\nv 1 \\\n y 0\n"), "model.obj:4: 'y' is no number");
+    CHECK_THROWS(load("o a \\\n b \\\n c\nf 1 2 0\n"), "model.obj:4: vertex index 0");
+    CHECK_THROWS(load(square + "f 1 \\\n 2\n"), "model.obj:5: a face needs three corners, this one has 2");
+    CHECK_THROWS(load(square + "f 1 \\2 3\n"), "model.obj:5:");
+}
+
+TEST("lines of a megabyte") {
+    const std::string blanks(1200000, ' ');
+    CHECK_EQ(faces(square + "#" + std::string(1500000, 'x') + "\nf 1 2" + blanks + "3\n"), "0 1 2");
+    CHECK_EQ(faces(square + "curv " + std::string(3000000, '1') + "\nf 1 2 3\n"), "0 1 2");
+    std::string many = square + "f";
+    for (int i = 0; i < 300000; i++) many += " 1 2 3";
+    const Model m = load(many + "\nf 2 3 4");
+    CHECK_EQ(m.nfaces(), 3 * 300000 - 2 + 1);
+    CHECK_EQ(m.corner(m.nfaces() - 1, 0).vert, 1);
+    CHECK_THROWS(load(square + "f 1 2" + blanks + "0\n"), "model.obj:5: vertex index 0");
+    std::string continued = square + "f 1 2 3";
+    for (int i = 0; i < 400000; i++) continued += "\\\n ";  // a line of a megabyte in many pieces
+    CHECK_EQ(faces(continued + "4"), "0 1 2, 0 2 3");
+    CHECK_THROWS(load(continued + "x"), "model.obj:400005: 'x' is no vertex index");
+}
+
+TEST("lines of all lengths, over many reads of the file") {
+    std::mt19937 random(1);
+    std::string obj;
+    const int n = 40000;
+    for (int i = 0; i < n; i++) {
+        const char* const end = i % 3 == 0 ? "\r\n" : "\n";
+        obj += "v " + std::to_string(i) + (i % 5 == 0 ? "\\\n " : " ") + std::to_string(i + 1) + " 0" + end;
+        if (random() % 4 == 0) obj += "#" + std::string(random() % 400, '.') + (i % 7 == 0 ? "\\" : "") + end;
+        if (random() % 4 == 0) obj += std::string(random() % 100, ' ') + end;
+    }
+    const auto lines = std::count(obj.begin(), obj.end(), '\n');
+    const Model m = load(obj + "f 1 2 3");
+    bool right = m.nverts() == n;
+    for (int i = 0; right && i < n; i++) right = m.verts()[static_cast<std::size_t>(i)] == vec3{i * 1., i + 1., 0};
+    CHECK(right);
+    CHECK(obj.size() > 5u << 18);  // five reads at least
+    const std::string where = "model.obj:" + std::to_string(lines + 1) + ": vertex index 0";
+    CHECK_THROWS(load(obj + "f 1 2 0"), where.c_str());
+}
+
+TEST("the last line needs no newline") {
+    CHECK_EQ(faces(square + "f 1 2 3"), "0 1 2");
+    CHECK_EQ(load("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 1 1 .5").verts()[2].z, .5);
+    CHECK_EQ(faces(square + "f 1 2 3\r"), "0 1 2");
+    // Ends at, and around, a boundary of what is read at once.
+    for (int more = -3; more <= 3; more++) {
+        std::string obj = square + "f 1 2 3\n#";
+        obj += std::string(static_cast<std::size_t>((1 << 18) + more) - obj.size() - 8, '-') + "\nf 2 3 4";
+        CHECK_EQ(faces(obj), "0 1 2, 1 2 3");
+    }
+}
+
+TEST("a byte order mark and empty lines are skipped") {
+    CHECK_EQ(load("\xEF\xBB\xBFv 5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").verts()[0].x, 5);
+    CHECK_EQ(faces("\n\n\r\n \t\n" + square + "\n\n\nf 1 2 3\n\n"), "0 1 2");
+    CHECK_THROWS(load("\xEF\xBB\xBF\n\nf 0 1 1"), "model.obj:3:");
+}
+
+TEST("o, g, s, lines, curves and unknown words are passed over") {
+    CHECK_EQ(faces("o head\ng a b c\ns 1\ns off\n" + square +
+                   "vp 1 2 3\nl 1 2\np 1\ncstype bezier\nverse 1 2\nfoo\nV 1 2 3\nF 1 2 3\nvt\xC3\xA9 x\n\x01\x02\nf 1 2 3\nend\n"),
+             "0 1 2");
+}
+
+// ---- numbers ----
+
+TEST("numbers are read as strtod reads them, to the last bit") {
+    std::vector<std::string> numbers = {"0", "-0", "+1", ".5", "-.5", "+.5", "5.", "1e3", "1E3", "1e+3", "1.5e-3", "-2.5E-10", "00012.50",
+                                        "999999999999999", "9999999999999999", "0.1", "123456789.123456", "1.23456789012345",
+                                        "0.000000000000001", "9007199254740993", "2.2250738585072014e-308", "5e-324", "1e-310",
+                                        "1.7976931348623157e308", "0.30000000000000004", "179769313486231570000000000000e279",
+                                        "100000000000000000000000000000000000000", "0.00000000000000000000000000000000001",
+                                        "1e-400", "-1e-400", "0e999", "0.0e-999", "1e-99999999999999999999", "1" + std::string(400, '0') + "e-400",
+                                        "0." + std::string(400, '0') + "1", "0." + std::string(400, '0') + "1e402"};
+    std::mt19937 random(2);
+    for (int i = 0; i < 20000; i++) {
+        std::string s = random() % 3 == 0 ? "-" : "";
+        for (auto n = random() % 12; n-- > 0;) s += static_cast<char>('0' + random() % 10);
+        s += '.';
+        for (auto n = 1 + random() % 12; n-- > 0;) s += static_cast<char>('0' + random() % 10);
+        if (random() % 4 == 0) s += "e" + std::to_string(static_cast<int>(random() % 560) - 280);
+        numbers.push_back(s);
+    }
+    std::string obj;
+    for (const std::string& s : numbers) obj += "v " + s + " 0 0\n";
+    const Model m = load(obj + "f 1 2 3\n");
+    int wrong = 0;
+    for (std::size_t i = 0; i < numbers.size(); i++) {
+        const double expected = std::strtod(numbers[i].c_str(), nullptr), got = m.verts()[i].x;
+        if (expected == got && std::signbit(expected) == std::signbit(got)) continue;
+        if (++wrong < 5) report_failure(__FILE__, __LINE__, numbers[i] + " was read as " + shown(got));
+    }
+    CHECK_EQ(wrong, 0);
+}
+
+TEST("a weight or colours after the coordinates are passed over") {
+    const Model m = load("v 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 1 1 0 .1 .2 .3 1\nvt 1\nvt .5 .25 0\nvn 0 0 2 1\nf 1/1/1 2/2/1 3/1/1\n");
+    CHECK_EQ(text(m.verts()[1]), "1 0 0");
+    CHECK(m.uv(0, 0) == (vec2{1, 0}));
+    CHECK(m.uv(0, 1) == (vec2{.5, .25}));
+    CHECK_EQ(text(m.normal(0, 0)), "0 0 1");
+}
+
+TEST("what is no finite number is an error with its line") {
+    for (const char* bad : {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309", "1e99999999999999999999", "nan(7)",
+                            "179769313486231570000000000000e280"}) {
+        const std::string where = "model.obj:2: '" + std::string(bad) + "' is not finite";
+        CHECK_THROWS(load("\nv 0 " + std::string(bad) + " 0\n"), where.c_str());
+        CHECK_THROWS(load("\nvt " + std::string(bad) + " 0\n"), where.c_str());
+        CHECK_THROWS(load("\nvn 0 0 " + std::string(bad) + "\n"), where.c_str());
+        CHECK_THROWS(load("\nv 0 0 0 " + std::string(bad) + "\n"), where.c_str());
+    }
+    const std::string long_number = "1" + std::string(400, '0');
+    CHECK_THROWS(load("v " + long_number + " 0 0\n"), "model.obj:1: '1000000000");
+    CHECK_THROWS(load("v " + long_number + " 0 0\n"), "...' is not finite");
+}
+
+TEST("garbage after or instead of a number is an error with its line") {
+    for (const char* bad : {"1x", "1.2.3", "1e", "1e+", "1-2", "0x10", "1,5", "1_0", "1/2", "1\\2", "1\x02"})
+        CHECK_THROWS(load(square + "v 0 0 " + bad + "\n"), "model.obj:5: garbage after a number: '");
+    for (const char* bad : {"x", ".", "-", "+", "+-1", "-+1", "--1", "e5", ",5", "one", "\\1", "/"})
+        CHECK_THROWS(load(square + "v 0 0 " + bad + "\n"), "is no number");
+    for (const char* bad : {"1x", "1/1x", "1//1x", "1/1/1/1", "1.0", "1/1/1x", "1e0"})
+        CHECK_THROWS(load(square + extras + "f 1 2 " + bad + "\n"), "model.obj:11: garbage after a number: '");
+    for (const char* bad : {"x", "/1", "//1", "-", "+", "--1", "nan"})
+        CHECK_THROWS(load(square + extras + "f 1 2 " + bad + "\n"), "is no vertex index");
+    CHECK_THROWS(load(square + extras + "f 1 2/x 3\n"), "model.obj:11: garbage after a number: 'x'");
+    CHECK_THROWS(load(square + extras + "f 1 2/- 3\n"), "is no texture index");
+    CHECK_THROWS(load("v 0 0 \x1B[2J\n"), "'?[2J' is no number");  // nothing of the file can steer a terminal
+}
+
+TEST("too few numbers or corners are an error with its line") {
+    CHECK_THROWS(load("v 1 2\n"), "model.obj:1: a vertex needs three coordinates");
+    CHECK_THROWS(load("\nv\n"), "model.obj:2: a vertex needs three coordinates");
+    CHECK_THROWS(load("v 1 2 #3\n"), "model.obj:1: a vertex needs three coordinates");
+    CHECK_THROWS(load("vn 1 2\n"), "model.obj:1: a normal needs three coordinates");
+    CHECK_THROWS(load("vt\n"), "model.obj:1: a texture coordinate needs a number");
+    CHECK_THROWS(load(square + "f\n"), "model.obj:5: a face needs three corners, this one has 0");
+    CHECK_THROWS(load(square + "f 1 2\n"), "model.obj:5: a face needs three corners, this one has 2");
+    CHECK_THROWS(load(square + "f 1 2 # 3\n"), "model.obj:5: a face needs three corners, this one has 2");
+}
+
+TEST("an index of zero or out of range is an error with its line") {
+    CHECK_THROWS(load(square + "f 1 2 0\n"), "model.obj:5: vertex index 0 (indices count from 1)");
+    CHECK_THROWS(load(square + extras + "f 1 2 3/0\n"), "model.obj:11: texture index 0 (indices count from 1)");
+    CHECK_THROWS(load(square + extras + "f 1 2 3//-0\n"), "model.obj:11: normal index 0 (indices count from 1)");
+    CHECK_THROWS(load(square + "f 1 2 5\n\nf 1 2 3\n"), "model.obj:5: vertex index 5, but the file has only 4");
+    CHECK_THROWS(load(square + "f 1 2 3\nf 1/1 2 3\n"), "model.obj:6: texture index 1, but the file has only 0");
+    CHECK_THROWS(load(square + extras + "f 1//4 2 3\n"), "model.obj:11: normal index 4, but the file has only 3");
+    CHECK_THROWS(load("f 1 2 3\n\nf 1 2 5\nf 9 9 9\n" + square), "model.obj:3: vertex index 5, but the file has only 4");
+    CHECK_THROWS(load(square + "f 1 2 -5\nv 0 0 0\n"), "model.obj:5: vertex index -5, but only 4 are defined so far");
+    CHECK_THROWS(load(square + "f 1/-1 2 3\n"), "model.obj:5: texture index -1, but only 0 are defined so far");
+    for (const char* huge : {"2147483648", "4294967297", "99999999999999999999999999", "-2147483648", "18446744073709551617"})
+        CHECK_THROWS(load(square + "f 1 2 " + huge + "\n"), "model.obj:5: vertex index '");
+    CHECK_THROWS(load(square + "f 1 2 2147483647\n"), "model.obj:5: vertex index 2147483647, but the file has only 4");
+}
+
+// ---- files as a whole ----
+
+TEST("a file without a face is an error") {
+    CHECK_THROWS(load(""), "model.obj: no faces");
+    CHECK_THROWS(load(square), "model.obj: no faces");
+    CHECK_THROWS(load("\\"), "model.obj: no faces");
+    CHECK_THROWS(load("this is a letter,\nand no model.\n"), "model.obj: no faces");
+}
+
+TEST("a missing file, a folder and a binary file are errors") {
+    const Folder folder;
+    CHECK_THROWS(Model(folder / "none.obj"), "none.obj: cannot be opened: ");
+    fs::create_directory(folder / "folder.obj");
+    CHECK_THROWS(Model(folder / "folder.obj"), "folder.obj: is a directory");
+    CHECK_THROWS(load(square + "f 1 2 3\n" + std::string(1, '\0')), "model.obj: is a binary file, not text");
+    std::string utf16;
+    for (const char c : square) utf16 += {c, '\0'};
+    CHECK_THROWS(load(utf16), "model.obj: is a binary file, not text");
+}
+
+TEST("no texture coordinates and no normals are no error") {
+    const Model m = load(square + "f 1 2 3 4\n");
+    check_invariants(m);
+    CHECK(m.uv(1, 2) == vec2{});
+    CHECK_EQ(m.corner(0, 0).uv, -1);
+    CHECK_EQ(normals(m, 1), "0 0 1, 0 0 1, 0 0 1");
+    CHECK_EQ(m.materials().size(), 1u);
+    CHECK_EQ(m.materials()[0].name, "");
+    CHECK(m.materials()[0].Kd == (vec3{1, 1, 1}));
+    CHECK_EQ(m.groups().size(), 1u);
+    CHECK_EQ(notes(m), "");
+}
+
+// ---- polygons ----
+
+namespace {
+
+using Polygon = std::vector<vec2>;
+
+double area2(const vec2& a, const vec2& b, const vec2& c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
+double area2(const Polygon& p) {
+    double sum = 0;
+    for (std::size_t i = 1; i + 1 < p.size(); i++) sum += area2(p[0], p[i], p[i + 1]);
+    return sum;
+}
+
+// The polygon as an .obj: its point (x,y) is placed at x*right + y*up.
+std::string in_plane(const Polygon& p, const vec3& right = {1, 0, 0}, const vec3& up = {0, 1, 0}, double scale = 1) {
+    std::string obj;
+    char line[200];
+    for (const vec2& q : p) {
+        const vec3 v = (right * q.x + up * q.y) * scale;
+        std::snprintf(line, sizeof line, "v %.17g %.17g %.17g\n", v.x, v.y, v.z);
+        obj += line;
+    }
+    obj += "f";
+    for (std::size_t i = 1; i <= p.size(); i++) obj += " " + std::to_string(i);
+    return obj + "\n";
+}
+
+struct Cut {
+    int faces = 0, empty = 0, reversed = 0;  // triangles in all, without area, and wound the wrong way
+    double area2 = 0;                        // their signed areas' sum
+};
+Cut cut(const Polygon& p, const Model& m) {
+    Cut result;
+    const double sign = area2(p) < 0 ? -1 : 1;
+    result.faces = m.nfaces();
+    for (int f = 0; f < m.nfaces(); f++) {
+        vec2 t[3];
+        for (int c = 0; c < 3; c++) t[c] = p[static_cast<std::size_t>(m.corner(f, c).vert)];
+        const double a = area2(t[0], t[1], t[2]);
+        result.area2 += a;
+        result.empty += a == 0;
+        result.reversed += a * sign < 0;
+    }
+    return result;
+}
+
+// With whole numbers as coordinates every area is exact. Signed areas always add up to the polygon's; so where none is
+// reversed the triangles cover the polygon, and each of its points once.
+void check_cut(const Polygon& p, bool empty_allowed = false) {
+    const std::pair<vec3, vec3> planes[] = {{{1, 0, 0}, {0, 1, 0}}, {{0, 1, 0}, {0, 0, 1}}, {{0, 0, 1}, {1, 0, 0}}, {{2, 1, 0}, {-1, 3, 1}},
+                                            {{0, -1, 0}, {3, 0, 1}}, {{1, 0, 0}, {0, -1, 0}}};
+    for (const auto& [right, up] : planes) {
+        const Cut result = cut(p, load(in_plane(p, right, up)));
+        CHECK_EQ(result.faces, static_cast<int>(p.size()) - 2);
+        CHECK_EQ(result.area2, area2(p));
+        CHECK_EQ(result.reversed, 0);
+        if (!empty_allowed) CHECK_EQ(result.empty, 0);
+    }
+}
+Polygon reversed(Polygon p) {
+    std::reverse(p.begin(), p.end());
+    return p;
+}
+
+bool touch(const vec2& a, const vec2& b, const vec2& c, const vec2& d) {  // segments ab and cd, ends included
+    const auto sign = [](double x) { return (x > 0) - (x < 0); };
+    const auto overlap = [](double p, double q, double r, double s) {
+        return std::max(std::min(p, q), std::min(r, s)) <= std::min(std::max(p, q), std::max(r, s));
+    };
+    return sign(area2(a, b, c)) * sign(area2(a, b, d)) <= 0 && sign(area2(c, d, a)) * sign(area2(c, d, b)) <= 0 &&
+           overlap(a.x, b.x, c.x, d.x) && overlap(a.y, b.y, c.y, d.y);
+}
+bool is_simple(const Polygon& p) {
+    const std::size_t n = p.size();
+    for (std::size_t i = 0; i < n; i++)
+        for (std::size_t j = i + 1; j < n; j++) {
+            const vec2 &a = p[i], &b = p[(i + 1) % n], &c = p[j], &d = p[(j + 1) % n];
+            if (j == i + 1 || (i == 0 && j == n - 1)) {  // neighbours: they must not fold back
+                const vec2 &from = j == i + 1 ? a : c, &at = j == i + 1 ? b : a, &to = j == i + 1 ? d : b;
+                if (area2(from, at, to) == 0 && dot(from - at, to - at) >= 0) return false;
+            } else if (touch(a, b, c, d)) {
+                return false;
+            }
+        }
+    return true;
+}
+
+// Random points in an order that crosses nowhere: crossings are undone, two edges at a time.
+Polygon random_polygon(std::mt19937& random, int n, int grid) {
+    Polygon p;
+    for (int i = 0; i < n; i++) p.push_back({static_cast<double>(random() % static_cast<unsigned>(grid)), static_cast<double>(random() % static_cast<unsigned>(grid))});
+    for (int round = 0; round < 200; round++) {
+        bool crossing = false;
+        for (std::size_t i = 0; i + 2 < p.size(); i++)
+            for (std::size_t j = i + 2; j < p.size(); j++)
+                if (!(i == 0 && j + 1 == p.size()) && touch(p[i], p[i + 1], p[j], p[(j + 1) % p.size()])) {
+                    std::reverse(p.begin() + static_cast<std::ptrdiff_t>(i) + 1, p.begin() + static_cast<std::ptrdiff_t>(j) + 1);
+                    crossing = true;
+                }
+        if (!crossing) break;
+    }
+    return p;
+}
+
+}  // namespace
+
+TEST("concave polygons are covered exactly once, in any plane, from any first corner") {
+    const Polygon shapes[] = {
+        {{0, 0}, {4, 0}, {1, 1}, {0, 4}},                                                        // a dart
+        {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}},                                        // an L
+        {{0, 0}, {9, 0}, {9, 9}, {6, 9}, {6, 3}, {3, 3}, {3, 9}, {0, 9}},                        // a U
+        {{0, 0}, {2, 8}, {4, 1}, {6, 8}, {8, 1}, {10, 8}, {12, 0}, {12, -1}, {0, -1}},           // a comb
+        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}},  // a spiral
+        {{0, 3}, {2, 2}, {3, 0}, {4, 2}, {6, 3}, {4, 4}, {3, 6}, {2, 4}},                        // a star
+        {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},                        // a square, its sides halved
+        {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3}},                                                // a triangle with five corners
+    };
+    for (Polygon p : shapes) {
+        CHECK(is_simple(p));
+        for (std::size_t i = 0; i < p.size(); i++) {
+            check_cut(p);
+            check_cut(reversed(p));
+            std::rotate(p.begin(), p.begin() + 1, p.end());
+        }
+    }
+}
+
+TEST("random simple polygons are covered exactly once") {
+    std::mt19937 random(3);
+    int tried = 0, concave = 0;
+    for (int i = 0; i < 2000; i++) {
+        const Polygon p = random_polygon(random, 4 + static_cast<int>(random() % 20), i % 2 ? 12 : 100);
+        if (!is_simple(p)) continue;
+        tried++;
+        const Cut result = cut(p, load(in_plane(p, {2, 1, 0}, {-1, 3, 1})));
+        CHECK_EQ(result.faces, static_cast<int>(p.size()) - 2);
+        CHECK_EQ(result.reversed, 0);
+        CHECK_EQ(result.empty, 0);
+        for (std::size_t k = 1; k + 1 < p.size(); k++) concave += area2(p[0], p[k], p[k + 1]) * area2(p) < 0;
+    }
+    CHECK(tried > 1000);
+    CHECK(concave > 1000);
+}
+
+TEST("a hole that a bridge joins to the outline, spikes and repeated corners") {
+    // The bridge from (0,0) to (3,3) is walked twice.
+    check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}}, true);
+    check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {5, 5}, {5, 7}, {7, 7}, {7, 5}, {5, 5}, {2, 2}, {2, 1}, {1, 1}}, true);
+    check_cut({{0, 0}, {4, 0}, {4, 4}, {7, 9}, {4, 4}, {0, 4}}, true);                  // outward
+    check_cut({{0, 0}, {4, 0}, {4, 4}, {2, 1}, {4, 4}, {0, 4}}, true);                  // inward
+    check_cut({{0, 0}, {4, 0}, {8, 0}, {4, 0}, {4, 4}, {0, 4}}, true);                  // along an edge
+    check_cut({{0, 0}, {0, 0}, {4, 0}, {4, 4}, {4, 4}, {4, 4}, {1, 1}, {0, 4}}, true);
+}
+
+TEST("a square with a cut along a random tree, walked around on both sides") {
+    std::mt19937 random(11);
+    constexpr int n = 6, directions[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};  // clockwise
+    for (int round = 0; round < 300; round++) {
+        bool used[n][n] = {}, edge[n][n][4] = {};  // the lattice points of the tree and its edges
+        std::vector<std::pair<int, int>> nodes{{0, 0}};
+        used[0][0] = true;
+        for (int i = 0; i < 60; i++) {
+            const auto [x, y] = nodes[random() % nodes.size()];
+            const unsigned d = random() % 4;
+            const int nx = x + directions[d][0], ny = y + directions[d][1];
+            if (nx < 0 || ny < 0 || nx >= n || ny >= n || used[nx][ny]) continue;
+            used[nx][ny] = edge[x][y][d] = edge[nx][ny][(d + 2) % 4] = true;
+            nodes.push_back({nx, ny});
+        }
+        // The walk keeps its left hand free: from each node on to the next edge clockwise from where it came.
+        Polygon p = {{-1, -1}, {n, -1}, {n, n}, {-1, n}, {-1, -1}};
+        int x = 0, y = 0;
+        unsigned back = 2;  // from the corner, that is between -x and -y
+        for (std::size_t steps = 0;; steps++) {
+            p.push_back({static_cast<double>(x), static_cast<double>(y)});
+            if (steps == 2 * (nodes.size() - 1)) break;
+            unsigned d = (back + (steps ? 1u : 0u)) % 4;
+            while (!edge[x][y][d]) d = (d + 1) % 4;
+            x += directions[d][0];
+            y += directions[d][1];
+            back = (d + 2) % 4;
+        }
+        CHECK(x == 0 && y == 0);
+        std::rotate(p.begin(), p.begin() + static_cast<std::ptrdiff_t>(random() % p.size()), p.end());
+        const Cut result = cut(p, load(in_plane(p, {2, 1, 0}, {-1, 3, 1})));
+        CHECK_EQ(result.faces, static_cast<int>(p.size()) - 2);
+        CHECK_EQ(result.area2, 2. * (n + 1) * (n + 1));
+        CHECK_EQ(result.reversed, 0);
+    }
+}
+
+TEST("polygons without area, or that cross themselves, have two triangles fewer than corners") {
+    for (const Polygon& p : {Polygon{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {1, 1}}, Polygon(7, vec2{1, 1}), Polygon{{0, 0}, {2, 2}, {2, 0}, {0, 2}},
+                             Polygon{{0, 0}, {2, 0}, {0, 0}, {2, 0}}, Polygon{{0, 3}, {2, -3}, {-3, 1}, {3, 1}, {-2, -3}}}) {
+        const Model m = load(in_plane(p));
+        check_invariants(m);
+        CHECK_EQ(m.nfaces(), static_cast<int>(p.size()) - 2);
+    }
+    std::mt19937 random(4);
+    for (int i = 0; i < 500; i++) {
+        Polygon p;
+        for (auto n = 4 + random() % 30; n-- > 0;) p.push_back({static_cast<double>(random() % 6), static_cast<double>(random() % 6)});
+        const Model m = load(in_plane(p));
+        CHECK_EQ(m.nfaces(), static_cast<int>(p.size()) - 2);
+        CHECK_EQ(cut(p, m).area2, area2(p));
+    }
+    Polygon star;  // of 100 points, twice around
+    for (int i = 0; i < 100; i++) star.push_back({std::cos(i * .13), std::sin(i * .13)});
+    CHECK_EQ(notes(load(in_plane(star))), "1 polygon crosses itself or cannot be cut well\n");
+}
+
+TEST("a polygon is cut alike at every scale, to the ends of the double's range") {
+    const Polygon p = {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}};
+    Polygon centred = p;  // so that differences overflow where coordinates do not
+    for (vec2& q : centred) q = q - vec2{5, 5};
+    for (const Polygon& shape : {p, centred}) {
+        const std::string expected = faces(in_plane(shape, {2, 1, 0}, {-1, 3, 1}));
+        for (const double scale : {1e-30, 1e38, 1e300, std::ldexp(1., 1017), std::ldexp(1., -1074), std::ldexp(1., -1040)})
+            CHECK_EQ(faces(in_plane(shape, {2, 1, 0}, {-1, 3, 1}, scale)), expected);
+    }
+}
+
+TEST("polygons of 100 000 corners") {
+    const int n = 100000;
+    Polygon comb, spiral, noise;
+    for (int i = 0; i < n / 2; i++) {
+        comb.push_back({2. * i, 0});
+        comb.push_back({2. * i + 1, 1000});
+    }
+    comb.insert(comb.end(), {{1. * n, 0}, {1. * n, -1}, {0, -1}});
+    for (const int side : {0, 1})
+        for (int i = 0; i < n / 2; i++) {
+            const double t = side ? n / 2 - 1 - i : i, angle = t * 1e-3, r = 1 + angle + (side ? 2 : 0);
+            spiral.push_back({r * std::cos(angle), r * std::sin(angle)});
+        }
+    std::mt19937 random(5);
+    for (int i = 0; i < n; i++) noise.push_back({static_cast<double>(random() % 1000), static_cast<double>(random() % 1000)});
+
+    const Cut of_comb = cut(comb, load(in_plane(comb)));
+    CHECK_EQ(of_comb.faces, n + 1);
+    CHECK_EQ(of_comb.reversed, 0);
+    CHECK_EQ(of_comb.area2, -1002. * n);
+    const Cut of_spiral = cut(spiral, load(in_plane(spiral)));
+    CHECK_EQ(of_spiral.faces, n - 2);
+    CHECK_EQ(of_spiral.reversed, 0);
+    CHECK_EQ(cut(noise, load(in_plane(noise))).faces, n - 2);  // it crosses itself: all that is asked is an end
+}
+
+// ---- normals ----
+
+namespace {
+
+std::string cube(const char* scale_exponent = "") {
+    std::string obj;
+    for (int i = 0; i < 8; i++)
+        for (int k = 0; k < 3; k++) obj += (k ? " " : "v ") + std::string(i >> k & 1 ? "1" : "-1") + scale_exponent + (k == 2 ? "\n" : "");
+    return obj;
+}
+const std::string cube_quads = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+
+void check_near(const vec3& a, const vec3& b, double tolerance) {
+    for (int i = 0; i < 3; i++) CHECK_NEAR(a[i], b[i], tolerance);
+}
+
+// Each result below is a handful of operations of half an epsilon, on numbers of at most 4.
+constexpr double few_roundings = 16 * std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+TEST("normals are weighted by angle, so it does not matter how a cube's sides are cut") {
+    for (const std::string& sides : {cube_quads, std::string("f 1 3 4\nf 1 4 2\nf 6 8 7\nf 6 7 5\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\n"
+                                                             "f 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n")}) {
+        const Model m = load(cube() + sides);
+        check_invariants(m);
+        CHECK_EQ(m.nfaces(), 12);
+        for (int f = 0; f < m.nfaces(); f++)
+            for (int c = 0; c < 3; c++) check_near(m.normal(f, c), m.vert(f, c) / std::sqrt(3.), few_roundings);
+    }
+    // Around (0,0,0): 90 degrees of the plane z = 0, 45 of the plane y = 0 seen from -y.
+    const Model m = load("v 0 0 0\nv 1 0 0\nv 0 5 0\nv 7 0 7\nf 1 2 3\nf 1 2 4\n");
+    check_near(m.normal(0, 0), normalized(vec3{0, -1, 2}), few_roundings);
+}
+
+TEST("made normals do not depend on the scale") {
+    const Model unit = load(cube() + cube_quads);
+    for (const char* scale : {"e-30", "e38", "e300", "e-300", "e308", "e-320"}) {
+        const Model m = load(cube(scale) + cube_quads);
+        check_invariants(m);
+        for (int f = 0; f < m.nfaces(); f++)
+            for (int c = 0; c < 3; c++) check_near(m.normal(f, c), unit.normal(f, c), few_roundings);
+    }
+    const Model flat = load("v -1.7e308 -1.7e308 1e308\nv 1.7e308 -1.7e308 1e308\nv 0 1.7e308 1e308\nf 1 2 3\n");
+    CHECK_EQ(normals(flat, 0), "0 0 1, 0 0 1, 0 0 1");
+    const Model needle = load("v 0 0 0\nv 1 0 0\nv 1 1e-200 0\nf 1 2 3\n");
+    CHECK_EQ(normals(needle, 0), "0 0 1, 0 0 1, 0 0 1");
+}
+
+TEST("faces without area contribute nothing") {
+    const std::string obj = "v 0 0 0\nv 3 0 0\nv 0 3 1\nv .1 .1 .1\nv .3 .3 .3\nv 9 9 9\nf 1 2 3\n";
+    const std::string expected = normals(load(obj), 0);
+    CHECK_EQ(normals(load(obj + "f 1 1 2\nf 2 2 2\nf 1 4 5\nf 3 1 3\n"), 0), expected);  // .1, .2, .3 are not on a line in binary
+    const Model m = load(obj + "f 4 5 6\nf 1 1 6\n");
+    check_invariants(m);
+    CHECK_EQ(normals(m, 0), expected);
+    CHECK_EQ(text(m.normal(2, 0)), text(m.normal(0, 0)));  // the vertex has another face
+    CHECK_EQ(text(m.normal(2, 2)), "0 0 1");               // it has none
+    CHECK_EQ(text(m.normal(1, 0)), "0 0 1");
+}
+
+TEST("where faces cancel, each keeps its own normal") {
+    const Model m = load("v 0 0 0\nv 1 .3 .2\nv .1 1 .7\nf 1 2 3\nf 1 3 2\n");
+    check_invariants(m);
+    const vec3 n = normalized(cross(m.verts()[1], m.verts()[2]));
+    for (int c = 0; c < 3; c++) {
+        check_near(m.normal(0, c), n, few_roundings);
+        check_near(m.normal(1, c), -n, few_roundings);
+    }
+    // A sheet of many triangles and its other side.
+    std::string obj;
+    std::mt19937 random(6);
+    for (int i = 0; i < 40; i++) obj += "v " + std::to_string(random() % 1000) + "e-3 " + std::to_string(random() % 1000) + "e-3 .123\n";
+    for (int i = 1; i + 1 < 40; i++)
+        for (const char* order : {"ab", "ba"}) {
+            const std::string a = std::to_string(i), b = std::to_string(i + 1);
+            obj += "f 40 " + (order[0] == 'a' ? a + " " + b : b + " " + a) + "\n";
+        }
+    const Model sheet = load(obj);
+    check_invariants(sheet);
+    for (int f = 0; f < sheet.nfaces(); f++)
+        for (int c = 0; c < 3; c++) CHECK_EQ(std::fabs(sheet.normal(f, c).z), 1);
+}
+
+TEST("given normals are normalised; one without length is made") {
+    const Model m = load(square + "vn 0 0 5\nvn 3e300 0 4e300\nvn 0 1e-310 0\nvn 0 0 0\nf 1//1 2//2 3//3\nf 1//4 3//-1 4\n");
+    check_invariants(m);
+    CHECK_EQ(text(m.normal(0, 0)), "0 0 1");
+    check_near(m.normal(0, 1), {.6, 0, .8}, few_roundings);
+    CHECK_EQ(text(m.normal(0, 2)), "0 1 0");
+    CHECK_EQ(normals(m, 1), "0 0 1, 0 0 1, 0 0 1");
+}
+
+// ---- materials ----
+
+TEST("faces are grouped by material, in the order of their first faces") {
+    const Folder folder;
+    folder.write("m.mtl", "newmtl red\nKd 1 0 0\nnewmtl unused\nnewmtl blue\nKd 0 0 1\n");
+    const Model m(folder.write("m.obj", square + "mtllib m.mtl\nusemtl blue\nf 1 2 3\nusemtl red\nf 2 3 4\nusemtl blue\nf 3 4 1\nf 4 1 2\nusemtl red\n"));
+    check_invariants(m);
+    CHECK_EQ(faces(m), "0 1 2, 2 3 0, 3 0 1, 1 2 3");
+    CHECK_EQ(m.materials().size(), 2u);
+    CHECK_EQ(m.materials()[0].name, "blue");
+    CHECK_EQ(m.materials()[1].name, "red");
+    CHECK_EQ(text(m.materials()[0].Kd), "0 0 1");
+    CHECK_EQ(m.groups()[0].end, 3);
+    CHECK_EQ(notes(m), "");
+}
+
+TEST("an unknown material is the default one, with a note") {
+    const Folder folder;
+    folder.write("m.mtl", "newmtl red\nKd .5\n");
+    const Model m(folder.write("m.obj", square + "f 1 2 3\nusemtl green\nf 2 3 4\nusemtl red\nf 3 4 1\nusemtl pink\nf 4 1 2\nusemtl green\nf 1 2 4\nmtllib m.mtl\n"));
+    check_invariants(m);
+    CHECK_EQ(faces(m), "0 1 2, 1 2 3, 3 0 1, 0 1 3, 2 3 0");
+    CHECK_EQ(m.materials().size(), 2u);
+    CHECK_EQ(m.materials()[0].name, "");
+    CHECK_EQ(text(m.materials()[1].Kd), "0.5 0.5 0.5");
+    CHECK_EQ(notes(m), "there is no material 'green'\nthere is no material 'pink'\n");
+}
+
+TEST("a missing .mtl is a note, a bad one an error") {
+    const Folder folder;
+    CHECK_EQ(notes(Model(folder.write("m.obj", "mtllib none.mtl\n" + square + "f 1 2 3\n"))), "there is no material file 'none.mtl'\n");
+    const std::string obj = "mtllib m.mtl\n" + square + "f 1 2 3\n";
+    folder.write("m.obj", obj);
+    for (const char* bad : {"Kd 1 x 0", "Kd nan", "Kd 1 2", "Kd", "Kd 1e999 0 0", "Kd 1 1 1y", "Kd spectre"}) {
+        folder.write("m.mtl", "# a comment\r\nnewmtl a\r\n\r\n" + std::string(bad) + "\r\n");
+        CHECK_THROWS(Model(folder / "m.obj"), "m.mtl:4: ");
+    }
+    folder.write("m.mtl", std::string("newmtl a\0", 9));
+    CHECK_THROWS(Model(folder / "m.obj"), "m.mtl: is a binary file, not text");
+    folder.write("m.mtl", "\xEF\xBB\xBF" "Kd 1 1 1\nnewmtl a\nKd xyz 1 1 1\nNs 10\nillum 2");
+    CHECK_EQ(notes(Model(folder / "m.obj")), "m.mtl:3: Kd xyz is not known, white is used\n");
+}
+
+TEST("an mtllib line is one name with blanks, or several names") {
+    const Folder folder;
+    fs::create_directory(folder / "sub");
+    folder.write("my own.mtl", "newmtl my own # colour\nKd .25\n");
+    folder.write("sub/b.mtl", "newmtl b\nKd 2 -1 .5\n");
+    const Model m(folder.write("m.obj", square + "mtllib  my own.mtl \r\nmtllib sub\\b.mtl c.mtl\nusemtl my own # colour \nf 1 2 3\nusemtl b\nf 1 2 3\n"));
+    CHECK_EQ(m.materials().size(), 2u);
+    CHECK_EQ(text(m.materials()[0].Kd), "0.25 0.25 0.25");
+    CHECK_EQ(text(m.materials()[1].Kd), "1 0 0.5");  // a reflectance is in [0,1]
+    CHECK_EQ(notes(m), "there is no material file 'c.mtl'\n");
+}
+
+TEST("notes are limited in number and length, and fit on a line each") {
+    std::string obj = square;
+    for (int i = 0; i < 100; i++) obj += "usemtl " + std::string(1000, 'x') + "\x1B\n" + "usemtl \x1B" + std::to_string(i) + "\nf 1 2 3\n";
+    const Model m = load(obj);
+    CHECK_EQ(m.notes().size(), 21u);
+    CHECK_EQ(m.notes()[0], "there is no material '?0'");
+    CHECK_EQ(m.notes().back(), "and 80 more like these");
+    const Model long_name = load(square + "usemtl " + std::string(100000, 'x') + "\nf 1 2 3\n");
+    CHECK(long_name.notes()[0].size() < 100);
+}
+
+// ---- textures ----
+
+namespace {
+
+const std::string textured = square + extras + "f 1/1 2/2 3/3\n";
+
+void all_suffixes(const Folder& folder) {
+    folder.picture("m_diffuse.tga", 10);
+    folder.picture("m_nm.tga", 20);
+    folder.picture("m_nm_tangent.tga", 30);
+    folder.picture("m_spec.tga", 40, TGAImage::GRAYSCALE);
+    folder.picture("m_glow.tga", 50);
+}
+std::string maps(const Material& m) {  // the first channels, -1 where there is no map
+    return shown(first(m.diffuse)) + " " + shown(first(m.normal)) + " " + shown(first(m.tangent)) + " " + shown(first(m.specular)) + " " +
+           shown(first(m.glow));
+}
+std::string maps(const Model& m) {
+    std::string out;
+    for (const Material& each : m.materials()) out += (out.empty() ? "" : ", ") + maps(each);
+    return out;
+}
+
+}  // namespace
+
+TEST("textures beside the model are found by their suffix, and may be absent") {
+    const Folder folder;
+    const fs::path obj = folder.write("m.obj", textured);
+    CHECK_EQ(maps(Model(obj)), "-1 -1 -1 -1 -1");
+    all_suffixes(folder);
+    const Model m(obj);
+    check_invariants(m);
+    CHECK_EQ(maps(m), "10 20 -1 40 50");
+    CHECK_EQ(notes(m), "");
+    CHECK_EQ(m.materials()[0].diffuse.get(1, 1)[2], 12);
+    CHECK_EQ(m.materials()[0].specular.bytespp(), 1);
+    fs::remove(folder / "m_diffuse.tga");
+    CHECK_EQ(maps(Model(obj)), "-1 20 -1 40 50");
+    CHECK_EQ(maps(Model(folder.write("m.b.obj", textured))), "-1 -1 -1 -1 -1");
+    folder.picture("m.b_glow.tga", 60);
+    CHECK_EQ(maps(Model(folder / "m.b.obj")), "-1 -1 -1 -1 60");
+}
+
+TEST("of two normal maps only the wanted one is decoded") {
+    const Folder folder;
+    all_suffixes(folder);
+    const fs::path obj = folder.write("m.obj", textured);
+    CHECK_EQ(maps(Model(obj, NormalMap::object)), "10 20 -1 40 50");
+    CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 -1 30 40 50");
+    folder.write("m_nm.tga", "no picture");
+    CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 -1 30 40 50");
+    CHECK_THROWS(Model(obj, NormalMap::object), "m_nm.tga: ");
+    fs::remove(folder / "m_nm.tga");
+    CHECK_EQ(maps(Model(obj, NormalMap::object)), "10 -1 30 40 50");
+    folder.picture("m_nm.tga", 20);
+    fs::remove(folder / "m_nm_tangent.tga");
+    CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 20 -1 40 50");
+}
+
+TEST("faces without texture coordinates have no textures, and none is decoded") {
+    const Folder folder;
+    folder.write("m_diffuse.tga", "no picture");
+    const fs::path obj = folder.write("m.obj", square + extras + "f 1 2 3\n");
+    const Model m(obj);
+    CHECK_EQ(maps(m), "-1 -1 -1 -1 -1");
+    CHECK_EQ(notes(m), "no texture coordinates, so no textures\n");
+    folder.picture("m_diffuse.tga", 10);
+    folder.write("m.mtl", "newmtl a\nnewmtl b\nmap_Kd m_diffuse.tga\n");
+    const Model two(folder.write("m.obj", "mtllib m.mtl\n" + square + extras + "usemtl a\nf 1 2 3/1\nusemtl b\nf 1 2 3\n"));
+    CHECK_EQ(maps(two), "10 -1 -1 -1 -1, -1 -1 -1 -1 -1");
+    CHECK_EQ(notes(two), "material 'b': no texture coordinates, so no textures\n");
+}
+
+TEST("the maps of an .mtl, relative to it, before those by suffix") {
+    const Folder folder;
+    fs::create_directory(folder / "lib");
+    fs::create_directory(folder / "lib/my maps");
+    for (const char* name : {"lib/my maps/a b.tga", "lib/s.TGA", "lib/n.tga", "lib/e.tga", "lib/bump.tga"})
+        folder.picture(name, name[4] == 'm' ? 100 : name[4] == 's' ? 110 : name[4] == 'n' ? 120 : name[4] == 'e' ? 130 : 140);
+    folder.write("lib/m.mtl",
+                 "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ks s.TGA\nnorm -bm 0.5 n.tga\n"
+                 "map_Bump -bm 1 bump.tga\nmap_Ke -mm 0 1 -blendu off -type sphere -imfchan l e.tga \r\n"
+                 "newmtl part\n  map_Kd\tmy maps/a b.tga\nnewmtl none\nKa 0 0 0\nnewmtl bumpy\nbump bump.tga\n");
+    const std::string obj = "mtllib lib/m.mtl\n" + square + extras;
+    std::string each;
+    for (const char* name : {"full", "part", "none", "bumpy"}) each += "usemtl " + std::string(name) + "\nf 1/1 2/2 3/3\n";
+    folder.write("m.obj", obj + each);
+    Model m(folder / "m.obj");
+    CHECK_EQ(maps(m), "100 -1 120 110 130, 100 -1 -1 -1 -1, -1 -1 -1 -1 -1, -1 -1 140 -1 -1");
+    CHECK_EQ(notes(m), "");
+    all_suffixes(folder);
+    CHECK_EQ(maps(Model(folder / "m.obj", NormalMap::tangent)), "100 -1 120 110 130, 100 -1 30 40 50, 10 -1 30 40 50, 10 -1 140 40 50");
+    CHECK_EQ(maps(Model(folder / "m.obj", NormalMap::object)), "100 20 -1 110 130, 100 20 -1 40 50, 10 20 -1 40 50, 10 20 -1 40 50");
+}
+
+TEST("a map that is no .tga, or is missing, is a note; one that is corrupt is an error") {
+    const Folder folder;
+    folder.write("m.mtl", "newmtl a\n\nmap_Kd texture.png\nmap_Ks gone.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke -bm x y.jpg\n");
+    folder.write("m.obj", "mtllib m.mtl\n" + textured + "usemtl a\nf 1/1 2/2 3/3\nusemtl unused\n");
+    folder.write("bad.tga", "no picture");
+    const Model m(folder / "m.obj");
+    CHECK_EQ(maps(m), "-1 -1 -1 -1 -1, -1 -1 -1 -1 -1");
+    CHECK_EQ(notes(m), "m.mtl:3: texture.png is not a TGA file, left out\nm.mtl:4: gone.tga does not exist, left out\n");
+    folder.picture("m_diffuse.tga", 10);
+    CHECK_EQ(maps(Model(folder / "m.obj")), "10 -1 -1 -1 -1, 10 -1 -1 -1 -1");  // instead
+    folder.write("m.obj", "mtllib m.mtl\nusemtl unused\n" + textured);
+    CHECK_THROWS(Model(folder / "m.obj"), "bad.tga: ");
+}
+
+TEST("errors come in a fixed order: the .obj, the .mtl, then the textures") {
+    const Folder folder;
+    folder.write("m.mtl", "Kd x\n");
+    for (const char* name : {"m_spec.tga", "m_diffuse.tga", "m_nm.tga", "m_glow.tga"}) folder.write(name, "no picture");
+    folder.write("m.obj", "mtllib m.mtl\n" + textured + "f 0 0 0\n");
+    CHECK_THROWS(Model(folder / "m.obj"), "m.obj:13: vertex index 0");
+    folder.write("m.obj", "mtllib m.mtl\n" + textured);
+    CHECK_THROWS(Model(folder / "m.obj"), "m.mtl:1: 'x' is no number");
+    folder.write("m.mtl", "");
+    for (int i = 0; i < 50; i++) CHECK_THROWS(Model(folder / "m.obj"), "m_diffuse.tga: ");
+    fs::remove(folder / "m_diffuse.tga");
+    for (int i = 0; i < 50; i++) CHECK_THROWS(Model(folder / "m.obj"), "m_nm.tga: ");
+}
+
+TEST("grey pictures are widened where three channels are read, and are no normal maps") {
+    const Folder folder;
+    for (const char* name : {"m_diffuse.tga", "m_nm.tga", "m_glow.tga", "m_spec.tga"}) folder.picture(name, 77, TGAImage::GRAYSCALE);
+    const Model m(folder.write("m.obj", textured));
+    check_invariants(m);
+    CHECK_EQ(maps(m), "77 -1 -1 77 77");
+    for (int c = 0; c < 3; c++) CHECK_EQ(m.materials()[0].diffuse.get(1, 0)[c], 77);
+    CHECK_EQ(m.materials()[0].specular.bytespp(), 1);
+    CHECK_EQ(notes(m), "m_nm.tga is grey, so no normal map: left out\n");
+}
+
+TEST("shared pictures are decoded once, and their copies are bounded") {
+    const Folder folder;
+    folder.picture("m_diffuse.tga", 5, TGAImage::RGBA, 3000);  // 36 MB each
+    std::string mtl, uses;
+    for (int i = 0; i < 40; i++) {
+        mtl += "newmtl " + std::to_string(i) + "\n";
+        uses += "usemtl " + std::to_string(i) + "\nf 1/1 2/2 3/3\n";
+    }
+    folder.write("m.mtl", mtl);
+    folder.write("m.obj", "mtllib m.mtl\n" + square + extras + uses);
+    CHECK_THROWS(Model(folder / "m.obj"), "m.obj: its materials share pictures that would take more than 1 GiB in copies");
+    folder.picture("m_diffuse.tga", 5);
+    const Model m(folder / "m.obj");
+    CHECK_EQ(m.materials().size(), 40u);
+    bool all = true;
+    for (const Material& each : m.materials()) all = all && maps(each) == "5 -1 -1 -1 -1";
+    CHECK(all);
+}
+
+// ---- fitting ----
+
+namespace {
+
+std::string points(const std::vector<vec3>& list) {
+    std::string obj;
+    char line[100];
+    for (const vec3& v : list) {
+        std::snprintf(line, sizeof line, "v %.17g %.17g %.17g\n", v.x, v.y, v.z);
+        obj += line;
+    }
+    return obj;
+}
+
+}  // namespace
+
+TEST("fit leaves a model within [-1,1]^3 as it is") {
+    Model m = load("v -1 -1 -1\nv 1 0 0\nv 0 .5 1\nv 99 0 0\nf 1 2 3\n");
+    CHECK(!m.fit());
+    CHECK_EQ(text(m.verts()[0]), "-1 -1 -1");
+    CHECK_EQ(text(m.verts()[3]), "99 0 0");
+    Model tiny = load("v 1e-30 0 0\nv 2e-30 0 0\nv 0 1e-30 0\nf 1 2 3\n");
+    CHECK(!tiny.fit());
+    Model none;
+    CHECK(!none.fit());
+}
+
+TEST("fit centres the box of the used vertices, and its largest half-side becomes 1") {
+    Model m = load("v 10 0 0\nv 14 2 0\nv 12 1 1\nv 1e308 -1e308 1e308\nf 1 2 3\n");
+    CHECK(m.fit());
+    CHECK_EQ(text(m.verts()[0]), "-1 -0.5 -0.25");
+    CHECK_EQ(text(m.verts()[1]), "1 0.5 -0.25");
+    CHECK_EQ(text(m.verts()[2]), "0 0 0.25");
+    check_invariants(m);
+    CHECK(!m.fit());
+    Model just = load("v 0 0 0\nv 1.0000000000000002 0 0\nv 0 1 0\nf 1 2 3\n");
+    CHECK(just.fit());
+    CHECK_EQ(just.verts()[0].x, -1);
+    CHECK_EQ(just.verts()[1].x, 1);
+}
+
+TEST("fit gives the same bits for a model scaled by any power of two") {
+    std::mt19937 random(8);
+    std::uniform_real_distribution<double> in(-1, 1);
+    std::vector<vec3> verts;
+    for (int i = 0; i < 300; i++) verts.push_back({1.5 + in(random), 3 * in(random) + 5e-9, in(random) * 1e-5});
+    verts[7].y = 1e-290;
+    std::string faces_text;
+    for (int i = 1; i < 298; i++) faces_text += "f " + std::to_string(i) + " " + std::to_string(i + 1) + " " + std::to_string(i + 2) + "\n";
+    Model unscaled = load(points(verts) + faces_text);
+    CHECK(unscaled.fit());
+    double largest = 0;
+    for (const vec3& v : unscaled.verts())
+        for (int k = 0; k < 3; k++) largest = std::max(largest, std::fabs(v[k]));
+    CHECK_EQ(largest, 1);
+    CHECK(!unscaled.fit());
+    for (const int exponent : {1, 3, 20, 100, 500, 1000, 1021}) {
+        std::vector<vec3> scaled = verts;
+        for (vec3& v : scaled) v = v * std::ldexp(1., exponent);
+        Model m = load(points(scaled) + faces_text);
+        CHECK(m.fit());
+        int different = 0;
+        for (std::size_t i = 0; i < verts.size(); i++) different += !(m.verts()[i] == unscaled.verts()[i]);
+        CHECK_EQ(different, 0);
+    }
+}
+
+TEST("fit at the ends of the arithmetic") {
+    Model huge = load("v -1.7e308 0 0\nv 1.7e308 0 1e308\nv 0 1e308 0\nf 1 2 3\n");
+    CHECK(huge.fit());
+    check_invariants(huge);
+    CHECK_EQ(huge.verts()[0].x, -1);
+    CHECK_EQ(huge.verts()[1].x, 1);
+    Model far_point = load("v 5 6e307 7\nf 1 1 1\n");
+    CHECK(far_point.fit());
+    CHECK_EQ(text(far_point.verts()[0]), "0 0 0");
+    Model far_speck = load("v 1e10 1e10 1e10\nv 10000000000.000002 1e10 1e10\nv 1e10 10000000000.000002 1e10\nv -1e308 0 0\nf 1 2 3\n");
+    CHECK(far_speck.fit());
+    check_invariants(far_speck);
+    CHECK_EQ(text(far_speck.verts()[1]), "1 -1 0");
+}
+
+// ---- anything at all ----
+
+namespace {
+
+// Loads whatever is in the folder: a model that keeps its promises, or a runtime_error; anything else fails.
+bool survives(const fs::path& obj) {
+    try {
+        Model m(obj);
+        check_invariants(m);
+        m.fit();
+        check_invariants(m);
+        return true;
+    } catch (const std::runtime_error& e) {
+        CHECK(std::string(e.what()).find('\n') == std::string::npos);
+        return false;
+    }
+}
+
+std::string mutated(std::string s, std::mt19937& random) {
+    static const char* const tokens[] = {"v ",  "vt ", "vn ", "f ",   "/",       "//",  "-1",    "0",       "1e999",    "nan", "\\\n", "\r\n",     "#",       "usemtl a\n",
+                                         "999", "-",   ".",   "e308", "1e-320 ", "\t",  "mtllib m.mtl\n", "newmtl b\n", "map_Kd ", "Kd ", "1 2 3 4 5 6 7 8"};
+    for (auto n = 1 + random() % 4; n-- > 0;) {
+        const std::size_t at = s.empty() ? 0 : random() % s.size(), length = random() % 12;
+        switch (random() % 6) {
+            case 0: s.insert(at, tokens[random() % std::size(tokens)]); break;
+            case 1: s.erase(at, length); break;
+            case 2: s.insert(at, s.substr(s.empty() ? 0 : random() % s.size(), length * 4)); break;
+            case 3: if (!s.empty()) s[at] = static_cast<char>(random()); break;
+            case 4: if (!s.empty()) s[at] = static_cast<char>('0' + random() % 10); break;
+            default: if (random() % 8 == 0) s.resize(at);
+        }
+    }
+    return s;
+}
+
+}  // namespace
+
+TEST("mutated files give a model or an error, never a crash") {
+    const Folder folder;
+    all_suffixes(folder);
+    folder.picture("a b.tga", 9);
+    const std::string mtl = "newmtl a\nKd .5 .5 .5\nmap_Kd -s 1 1 1 a b.tga\nmap_Bump m_nm.tga\nnewmtl b\nmap_Ks m_spec.tga\nKd 1\n";
+    const std::string obj = "# head\nmtllib m.mtl\n" + cube() + extras + "usemtl a\nf 1/1/1 3/2/2 4/3/3 2/1\ng x\nusemtl b\nf -8//1 -7 -6 -5 6\nf 1 2 \\\n 6 5\nf 3 7 8\nusemtl a\nf 1 5 7\n";
+    folder.write("m.mtl", mtl);
+    folder.write("m.obj", obj);
+    CHECK(survives(folder / "m.obj"));
+    std::mt19937 random(9);
+    int loaded = 0;
+    const int n = 3000;
+    for (int i = 0; i < n; i++) {
+        folder.write("m.obj", mutated(obj, random));
+        if (i % 4 == 0) folder.write("m.mtl", mutated(mtl, random));
+        loaded += survives(folder / "m.obj");
+    }
+    CHECK(loaded > n / 20);  // so both outcomes have been seen
+    CHECK(loaded < n - n / 20);
+}
+
+TEST("random bytes give a model or an error, never a crash") {
+    const Folder folder;
+    folder.write("m.mtl", "newmtl a\nKd 1 0 0\n");
+    std::mt19937 random(10);
+    const std::string alphabet = "vvftnfvf   0123456789123412341234//-.\\\n\n\n\n\n\r\t#e+";
+    for (int i = 0; i < 3000; i++) {
+        std::string bytes;
+        for (auto n = random() % 300; n-- > 0;)
+            bytes += i % 3 == 0 ? static_cast<char>(1 + random() % 255) : alphabet[random() % alphabet.size()];
+        survives(folder.write("m.obj", i % 2 ? square + square + bytes + "\nf 1 2 3\n" : bytes));
+        if (i % 10 == 0) {
+            folder.write("m.mtl", bytes);
+            survives(folder.write("m.obj", "mtllib m.mtl\n" + textured));
+        }
+    }
+    // Faces of random corners among random points, some of them at the ends of the range.
+    int loaded = 0;
+    for (int i = 0; i < 1000; i++) {
+        std::string obj;
+        for (int k = 0; k < 12; k++)
+            for (int c = 0; c < 3; c++) {
+                const char* const exponents[] = {"", "", "e-320", "e307", "e-160", "e-8"};
+                obj += (c ? " " : "v ") + std::to_string(static_cast<int>(random() % 7) - 3) + exponents[random() % std::size(exponents)] + (c == 2 ? "\n" : "");
+            }
+        for (int k = 0; k < 8; k++) {
+            obj += "f";
+            for (auto corners = 3 + random() % 8; corners-- > 0;) obj += " " + std::to_string(1 + random() % 12);
+            obj += "\n";
+        }
+        loaded += survives(folder.write("m.obj", obj));
+    }
+    CHECK_EQ(loaded, 1000);
+}
+
+int main(int argc, char** argv) { return run_tests(argc, argv); }
