@@ -1,0 +1,209 @@
+// our_gl.cpp: the cameras' matrices, and the way of a face from clip space to integer coverage.
+#include "our_gl.h"
+
+#include <cmath>
+
+mat4 lookat(const vec3& eye, const vec3& center, const vec3& up) {
+    vec3 z = normalized(eye - center);
+    if (z == vec3{}) z = {0, 0, 1};
+    vec3 x = normalized(cross(up, z));
+    if (x == vec3{}) {
+        const vec3 a{std::fabs(z.x), std::fabs(z.y), std::fabs(z.z)};
+        const vec3 axis = a.y <= a.x && a.y <= a.z ? vec3{0, 1, 0} : a.x <= a.z ? vec3{1, 0, 0} : vec3{0, 0, 1};
+        x = normalized(cross(axis, z));
+    }
+    const vec3 y = cross(z, x);
+    const mat4 rotation{{{x.x, x.y, x.z, 0}, {y.x, y.y, y.z, 0}, {z.x, z.y, z.z, 0}, {0, 0, 0, 1}}};
+    return rotation * translation(-center);  // rotate about the centre, not about the origin
+}
+
+mat4 projection(double c) { return {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, c, 1}}}; }
+
+mat4 viewport(double x, double y, double w, double h) {
+    const double d = screen_depth;
+    return {{{w / 2, 0, 0, x + w / 2}, {0, h / 2, 0, y + h / 2}, {0, 0, d / 2, d / 2}, {0, 0, 0, 1}}};
+}
+
+mat4 translation(const vec3& by) { return {{{1, 0, 0, by.x}, {0, 1, 0, by.y}, {0, 0, 1, by.z}, {0, 0, 0, 1}}}; }
+
+mat4 middle_viewport(int width, int height) {
+    const double side = .75 * std::min(width, height);
+    return viewport((width - side) / 2, (height - side) / 2, side, side);
+}
+
+int face_count(const std::vector<Model>& models) {
+    int n = 0;
+    for (const Model& model : models) n += model.nfaces();
+    return n;
+}
+
+TGAImage depth_picture(const DepthBuffer& depths) {
+    constexpr float nothing = -std::numeric_limits<float>::infinity();
+    constexpr double darkest = 32, white = 255;
+    float far = std::numeric_limits<float>::infinity(), near = nothing;
+    for (int y = 0; y < depths.height(); y++)
+        for (int x = 0; x < depths.width(); x++)
+            if (const float z = depths.row(y)[x]; z != nothing) far = std::min(far, z), near = std::max(near, z);
+    const double scale = near > far ? (white - darkest) / (static_cast<double>(near) - static_cast<double>(far)) : 0;
+    TGAImage picture(depths.width(), depths.height(), TGAImage::GRAYSCALE);
+    for (int y = 0; y < depths.height(); y++)
+        for (int x = 0; x < depths.width(); x++)
+            if (const float z = depths.row(y)[x]; z != nothing)
+                *picture.pixel(x, y) = static_cast<std::uint8_t>(white - scale * (static_cast<double>(near) - static_cast<double>(z)));
+    return picture;
+}
+
+namespace {
+
+// The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the rounding of
+// a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then moves by
+// 2^15 * 2^-50 / w_near. With w_near = 2^-22 that is 2^-13 pixel, which no picture shows, and things stay visible
+// down to a quarter of a millionth of the viewing distance.
+constexpr double w_near = 1. / (1 << 22);
+
+// How far outside of the picture, in pixels, coverage is still computed exactly instead of being clipped: most faces that
+// cross the border need no clipping. 2 * 4096 + 16384 pixels at 16 sub-pixel bits make differences below 2^30.6.
+constexpr double guard = 4096;
+
+// Distances to the clipping planes, homogeneous; inside where >= 0. s is a corner in homogeneous screen coordinates.
+struct Planes {
+    double right, top;
+    static constexpr int count = 5;
+    double distance(int plane, const vec4& s) const {
+        switch (plane) {
+            case 0: return s.w - w_near;
+            case 1: return s.x + guard * s.w;
+            case 2: return right * s.w - s.x;
+            case 3: return s.y + guard * s.w;
+            default: return top * s.w - s.y;
+        }
+    }
+};
+
+// Sutherland and Hodgman, one plane. A cut edge gets the same new corner from both of its faces, bit for bit: it is always
+// computed from the inner towards the outer end.
+int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* out) {
+    int m = 0;
+    for (int i = 0; i < n; i++) {
+        const vec4 &a = in[i], &b = in[(i + 1) % n];
+        const double da = planes.distance(plane, a), db = planes.distance(plane, b);
+        if (da >= 0) out[m++] = a;
+        if ((da >= 0) != (db >= 0)) {
+            const bool a_inside = da >= 0;
+            const double d_in = a_inside ? da : db, d_out = a_inside ? db : da;
+            const vec4 &p = a_inside ? a : b, &q = a_inside ? b : a;
+            out[m++] = p + (q - p) * (d_in / (d_in - d_out));
+        }
+    }
+    return m;
+}
+
+}  // namespace
+
+Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int height, TriangleSetup& t) {
+    const vec4 s[3] = {Viewport * clip[0], Viewport * clip[1], Viewport * clip[2]};
+
+    for (const vec4& p : s)  // a coordinate beyond the range of a double has no place on the screen
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z) || !std::isfinite(p.w)) return Setup::outside;
+
+    // Wholly behind the eye or beyond one side of the picture.
+    const auto all = [&](auto&& outside) { return outside(s[0]) && outside(s[1]) && outside(s[2]); };
+    if (all([](const vec4& p) { return !(p.w >= w_near); }) || all([](const vec4& p) { return !(p.x > 0); }) ||
+        all([](const vec4& p) { return !(p.y > 0); }) || all([=](const vec4& p) { return !(p.x < width * p.w); }) ||
+        all([=](const vec4& p) { return !(p.y < height * p.w); }))
+        return Setup::outside;
+
+    // Clip against those planes that a corner is outside of.
+    const Planes planes{width + guard, height + guard};
+    vec4 buffer[2][TriangleSetup::max_corners];
+    vec4* polygon = buffer[0];
+    std::copy_n(s, 3, polygon);
+    int n = 3;
+    for (int plane = 0; plane < Planes::count; plane++) {
+        if (!all([&](const vec4& p) { return planes.distance(plane, p) >= 0; })) {
+            vec4* const target = polygon == buffer[0] ? buffer[1] : buffer[0];
+            n = clip_polygon(planes, plane, polygon, n, target);
+            polygon = target;
+        }
+    }
+    if (n < 3) return Setup::outside;
+
+    // Divide by w and snap.
+    constexpr double one = 1 << TriangleSetup::subpixel_bits;
+    constexpr std::int32_t half = 1 << (TriangleSetup::subpixel_bits - 1);
+    t.corners = n;
+    t.zmin = std::numeric_limits<double>::infinity();
+    t.zmax = -t.zmin;
+    std::int32_t lo[2] = {INT32_MAX, INT32_MAX}, hi[2] = {INT32_MIN, INT32_MIN};
+    for (int i = 0; i < n; i++) {
+        const vec3 p = project(polygon[i]);
+        // On a guard plane rounding may land a hair outside: that is no more than 2^-10 of a sub-pixel.
+        t.x[i] = static_cast<std::int32_t>(std::floor(std::clamp(p.x, -guard, width + guard) * one + .5));
+        t.y[i] = static_cast<std::int32_t>(std::floor(std::clamp(p.y, -guard, height + guard) * one + .5));
+        lo[0] = std::min(lo[0], t.x[i]), hi[0] = std::max(hi[0], t.x[i]);
+        lo[1] = std::min(lo[1], t.y[i]), hi[1] = std::max(hi[1], t.y[i]);
+        t.zmin = std::min(t.zmin, p.z), t.zmax = std::max(t.zmax, p.z);
+    }
+    // Pixel x has its centre at x + half: the first at or right of lo, the last at or left of hi.
+    t.xmin = std::max(0, (lo[0] + half - 1) >> TriangleSetup::subpixel_bits);
+    t.ymin = std::max(0, (lo[1] + half - 1) >> TriangleSetup::subpixel_bits);
+    t.xmax = std::min(width - 1, (hi[0] - half) >> TriangleSetup::subpixel_bits);
+    t.ymax = std::min(height - 1, (hi[1] - half) >> TriangleSetup::subpixel_bits);
+    if (t.xmin > t.xmax || t.ymin > t.ymax) return Setup::between_samples;
+
+    // Perspective without a division per corner (Olano and Greer, "Triangle scan conversion using 2D homogeneous
+    // coordinates", 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are linear functions
+    // on the screen whose ratio is that of the barycentric coordinates on the face. They hold for the whole face, clipped or
+    // not, corners behind the eye included. Coordinates relative to a pixel of the face keep the products small.
+    t.origin = {t.xmin + .5, t.ymin + .5};
+    vec3 v[3];
+    for (int i = 0; i < 3; i++) v[i] = {s[i].x - t.origin.x * s[i].w, s[i].y - t.origin.y * s[i].w, s[i].w};
+    vec3 e[3] = {cross(v[1], v[2]), cross(v[2], v[0]), cross(v[0], v[1])};
+    const double det = dot(v[0], e[0]);
+    if (det != 0 && std::isfinite(det)) {
+        const double sign = det < 0 ? -1 : 1;
+        for (vec3& f : e) f = f * sign;
+        t.ex = {e[0].x, e[1].x, e[2].x};
+        t.ey = {e[0].y, e[1].y, e[2].y};
+        t.e0 = {e[0].z, e[1].z, e[2].z};
+        // depth = sum(z_i e_i) / sum(w_i e_i), and the denominator is |det| everywhere. Depths are taken relative to that
+        // of the corner farthest in front of the eye, so that a small slope is not the difference of large numbers.
+        const int r = s[0].w >= s[1].w ? (s[0].w >= s[2].w ? 0 : 2) : (s[1].w >= s[2].w ? 1 : 2);
+        const double z0 = s[r].z / s[r].w;
+        vec3 z{s[0].z - z0 * s[0].w, s[1].z - z0 * s[1].w, s[2].z - z0 * s[2].w};
+        z[r] = 0;
+        t.zx = dot(z, t.ex) / std::fabs(det);
+        t.zy = dot(z, t.ey) / std::fabs(det);
+        t.z0 = z0 + dot(z, t.e0) / std::fabs(det);
+    } else {
+        // Seen exactly edge-on, yet snapped to a sliver: its neighbours leave those samples to it. It shows corner 0.
+        t.ex = t.ey = {};
+        t.e0 = {1, 0, 0};
+        t.zx = t.zy = 0;
+        t.z0 = t.zmax;
+    }
+    return Setup::drawn;
+}
+
+void triangle(const TriangleSetup& t, int number, DepthBuffer& zbuffer, FaceBuffer* faces, const Share& share, Counters& count) {
+    share.for_each_span(t, [&](int y, int x_begin, int x_end) {
+        float* const depth = zbuffer.row(y);
+        std::int32_t* const face = faces ? faces->row(y) : nullptr;
+        count.covered += x_end - x_begin;
+        for (int x = x_begin; x < x_end; x++) {
+            const float z = static_cast<float>(t.depth(x, y));
+            if (!(z > depth[x])) continue;
+            depth[x] = z;
+            if (face) face[x] = number;
+            count.nearer++;
+        }
+    });
+}
+
+std::vector<char> numbers_seen(const FaceBuffer& faces, int count) {
+    std::vector<char> seen(static_cast<std::size_t>(count));
+    for (int y = 0; y < faces.height(); y++)
+        for (int x = 0; x < faces.width(); x++)
+            if (const std::int32_t number = faces.row(y)[x]; number >= 0) seen[static_cast<std::size_t>(number)] = 1;
+    return seen;
+}
