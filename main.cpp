@@ -3,17 +3,18 @@
 #include "geometry.h"
 #include "model.h"
 #include "our_gl.h"
+#include "shadow_error.h"
 #include "tgaimage.h"
 
-#include <charconv>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
+#include <cstdlib>
 #include <iostream>
-#include <set>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <variant>
 #include <vector>
 
 struct Options {  // the lesson's scene
@@ -22,46 +23,107 @@ struct Options {  // the lesson's scene
     int width = 800, height = 800, shadow_size = 800;  // pixels
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     vec3 light{1, 1, 0};  // towards the light
-    double bias = 43.34;  // of screen_depth
-    bool shadow = true, fit = true, tangent = false, quiet = false;
+    enum class Shadow { map, exact, off } shadow = Shadow::map;
+    std::optional<double> bias;  // the lesson's constant, of screen_depth; else the bias is derived
+    bool fit = true, tangent = false, report = false, quiet = false;
     int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+};
+
+struct Scene {
+    Options opt;
+    std::vector<Model> models;
+    Camera viewer;
 };
 
 // ---- pass 1: what the light sees ----
 
-// Only the depth is wanted, so there is no fragment().
-struct DepthShader final : IShader {
+struct DepthShader final : IShader {  // only the depth is wanted, so there is no fragment()
     const Model& model;
-    mat4 uniform_M;  // object to the light's clip space
+    mat4 uniform_M;  // object to the camera's clip space
 
-    DepthShader(const Model& m, const Camera& light) : model(m), uniform_M(light.object_to_clip()) {}
+    DepthShader(const Model& m, const Camera& camera) : model(m), uniform_M(camera.object_to_clip()) {}
     vec4 vertex(int face, int corner) override { return uniform_M * point(model.vert(face, corner)); }
 };
 
 // ---- pass 2: what the viewer sees ----
 
-// Is a fragment lit? Find it in the shadow buffer: if the light saw something nearer there, it is not.
-struct Shadow {
-    const DepthBuffer* shadowbuffer;  // null: everything is lit
-    mat4 uniform_Mshadow;             // the viewer's screen to the light's screen
-    double bias;                      // in units of screen_depth
+// Is a fragment lit? Each method below is asked that. All of them know the fragment's face in the light's picture:
+// the corners' places there are varyings like any other.
+struct Receiver {
+    mat4 uniform_Mshadow;        // object space to the light's screen
+    vec3 varying_light[3] = {};  // the face's corners on the light's screen
+    int number = 0;              // of the face among those of all models
 
-    bool lit(const vec3& screen) const {
-        if (!shadowbuffer) return true;
-        const vec3 p = project(uniform_Mshadow * point(screen));
-        const int x = static_cast<int>(std::floor(p.x)), y = static_cast<int>(std::floor(p.y));
-        return !shadowbuffer->inside(x, y) || static_cast<double>(shadowbuffer->row(y)[x]) <= p.z + bias;
+    void vertex(int face_number, int corner, const vec3& v) {
+        number = face_number;
+        varying_light[corner] = project(uniform_Mshadow * point(v));
     }
+    vec3 on_light_screen(const vec3& bar) const { return interpolated(varying_light, bar); }
+    vec2 slope() const {  // of the depth, per texel along x and y
+        const vec3 n = cross(varying_light[1] - varying_light[0], varying_light[2] - varying_light[0]);
+        return {-n.x / n.z, -n.y / n.z};
+    }
+};
+
+// --shadow off
+struct NoShadow {
+    void vertex(int, int, const vec3&) {}
+    bool lit(const Fragment&) const { return true; }
+};
+
+// --bias N: the classic lesson's test. Its samples lie at the texels' corners (for that the viewport is shifted by half a
+// texel) and the look-up is cut to an integer. What is nearer to the light by less than a constant casts no shadow.
+struct ConstantBias : Receiver {
+    static constexpr double shift = .5;
+    const DepthBuffer* shadowbuffer;
+    double bias;  // in units of screen_depth
+
+    bool lit(const Fragment& f) const {
+        const vec3 p = on_light_screen(f.bar);
+        return static_cast<double>(shadowbuffer->at(p.x - shift, p.y - shift)) <= p.z + bias;
+    }
+};
+
+// --shadow map: the shadow buffer with a bias that follows from the slopes. The buffer knows depths at the centres of its
+// texels only, so the fragment is compared with the texel whose centre is nearest; beside the buffer there is no caster.
+struct ShadowMap : Receiver {
+    static constexpr double shift = 0;
+    const DepthBuffer* shadowbuffer;
+
+    bool lit(const Fragment& f) const {
+        const vec3 p = on_light_screen(f.bar);
+        const auto depth = [&](int dx, int dy) { return static_cast<double>(shadowbuffer->at(p.x + dx, p.y + dy)); };
+        // The receiver's own plane at the texel's centre: if nothing is above it there, the fragment is lit. So no face
+        // shadows itself, at any angle. Rounding: the depth is a float, and coverage is snapped, so that a centre may be
+        // drawn with a depth of the face up to 2^-16 texel away.
+        const double stored = depth(0, 0);
+        const vec2 g = slope(), to_centre{std::floor(p.x) + .5 - p.x, std::floor(p.y) + .5 - p.y};
+        const double rounding = depth_rounding + (std::fabs(g.x) + std::fabs(g.y)) / (1 << TriangleSetup::subpixel_bits);
+        if (!(stored > p.z + dot(g, to_centre) + rounding)) return true;
+        // What is above it there may be lower here, up to half a texel away. Its slope is that towards the nearer in depth
+        // of the two neighbours, since the other may belong to something else.
+        const double slope_x = std::min(std::fabs(stored - depth(-1, 0)), std::fabs(stored - depth(1, 0)));
+        const double slope_y = std::min(std::fabs(stored - depth(0, -1)), std::fabs(stored - depth(0, 1)));
+        return !(stored - (slope_x + slope_y) / 2 > p.z + rounding);
+    }
+};
+
+// --shadow exact: no buffer to resolve. The faces that may stand in the way are looked up and tested one by one.
+struct ExactShadow : Receiver {
+    const LightGrid* grid;
+
+    bool lit(const Fragment& f) const { return !grid->shadows(on_light_screen(f.bar), number); }
 };
 
 enum class Normals { vertex, object, tangent };  // where the shading normal comes from: the vertices or a map
 
 // Phong's reflection model, shadowed. Everything is in eye coordinates. What the material has no map for is not computed.
-template <Normals normals>
+template <Normals normals, class Shadow>
 struct PhongShader final : IShader {
     const Model& model;
     const Material& material;
     Shadow shadow;
+    int first_number;           // of the model's faces
     mat4 uniform_M, uniform_P;  // object to eye, eye to clip
     mat4 uniform_MIT;           // carries normals where uniform_M carries points
     vec3 uniform_l;             // towards the light, unit
@@ -70,13 +132,15 @@ struct PhongShader final : IShader {
     vec3 varying_nrm[3];  // the vertices' normals
     vec3 varying_tri[3];  // the corners
 
-    PhongShader(const Model& m, const Material& mat, const Camera& camera, const vec3& light, const Shadow& s)
-        : model(m), material(mat), shadow(s), uniform_M(camera.ModelView), uniform_P(camera.Projection),
-          uniform_MIT(invert_transpose(camera.ModelView).value()),
-          uniform_l(normalized((camera.ModelView * direction(light)).xyz())) {}
+    PhongShader(const Scene& scene, const Model& m, const Material& mat, const Shadow& s, int first)
+        : model(m), material(mat), shadow(s), first_number(first), uniform_M(scene.viewer.ModelView),
+          uniform_P(scene.viewer.Projection), uniform_MIT(invert_transpose(uniform_M).value()),
+          uniform_l(normalized((uniform_M * direction(scene.opt.light)).xyz())) {}
 
     vec4 vertex(int face, int corner) override {
-        const vec4 eye = uniform_M * point(model.vert(face, corner));
+        const vec3& v = model.vert(face, corner);
+        const vec4 eye = uniform_M * point(v);
+        shadow.vertex(first_number + face, corner, v);
         varying_uv[corner] = model.uv(face, corner);
         if constexpr (normals != Normals::object)
             varying_nrm[corner] = (uniform_MIT * direction(model.normal(face, corner))).xyz();
@@ -84,18 +148,9 @@ struct PhongShader final : IShader {
         return uniform_P * eye;
     }
 
-    template <class T>
-    static T interpolated(const T (&varying)[3], const vec3& bar) {
-        return varying[0] * bar.x + varying[1] * bar.y + varying[2] * bar.z;
-    }
-
-    static vec3 texel_to_vector(const std::uint8_t* bgr) {  // [0,255] to [-1,1]
-        return vec3{bgr[2] * 2 / 255. - 1, bgr[1] * 2 / 255. - 1, bgr[0] * 2 / 255. - 1};
-    }
-
     vec3 normal(const vec3& bar, const vec2& uv) const {  // unit, at this fragment
         if constexpr (normals == Normals::object)
-            return normalized((uniform_MIT * direction(texel_to_vector(sample2D(material.normal, uv)))).xyz());
+            return normalized((uniform_MIT * direction(sample_normal(material.normal, uv))).xyz());
         const vec3 n = normalized(interpolated(varying_nrm, bar));
         if constexpr (normals == Normals::vertex) return n;
         // Darboux frame (i, j, n): i is the direction across n in which u grows, j that in which v grows. A mirrored
@@ -105,7 +160,7 @@ struct PhongShader final : IShader {
         const vec3 a = cross(e2, n), b = cross(n, e1);
         const double side = dot(e1, a) < 0 ? -1 : 1;
         const vec3 i = normalized((a * d1.x + b * d2.x) * side), j = normalized((a * d1.y + b * d2.y) * side);
-        const vec3 t = texel_to_vector(sample2D(material.tangent, uv));
+        const vec3 t = sample_normal(material.tangent, uv);
         return normalized(i * t.x + j * t.y + n * t.z);
     }
 
@@ -120,7 +175,7 @@ struct PhongShader final : IShader {
                 const vec3 r = n * (2 * n_l) - l;  // the light's mirror image; the viewer is at +z
                 if (r.z > 0) light += .6 * power(r.z, *sample2D(material.specular, uv));
             }
-            if (!shadow.lit(f.screen)) light *= .3;
+            if (!shadow.lit(f)) light *= .3;
         }
         const std::uint8_t* const diffuse = material.diffuse.empty() ? nullptr : sample2D(material.diffuse, uv);
         const std::uint8_t* const glow = material.glow.empty() ? nullptr : sample2D(material.glow, uv);
@@ -137,42 +192,57 @@ struct PhongShader final : IShader {
 
 struct Picture {
     DepthBuffer shadowbuffer, zbuffer;
+    FaceBuffer casters, faces;  // the nearest face in each of them (casters: only for a report)
+    LightGrid grid;             // in place of the shadow buffer
     TGAImage framebuffer;
-    Counters depth_pass, shading_pass;
-    double depth_ms = 0, shade_ms = 0;
+    Counters count;  // of pass 2
 };
 
-static double milliseconds() {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+using AnyShadow = std::variant<NoShadow, ConstantBias, ShadowMap, ExactShadow>;
 
-// Calls visit(model, number of its first face) for one model after the other.
-template <class Visit>
-static void for_each_model(const std::vector<Model>& models, Visit&& visit) {
-    int first = 0;
-    for (const Model& model : models) visit(model, first), first += model.nfaces();
-}
-
-// What is nearest to a camera: the depth and, if wanted, the number of the face.
-static Counters draw_depths(const std::vector<Model>& models, const Camera& camera, DepthBuffer& zbuffer, FaceBuffer* faces, int threads) {
+// The depth of all models as a camera sees them and, if asked for, the faces.
+static Counters draw_depths(const Scene& scene, const Camera& camera, DepthBuffer& zbuffer, FaceBuffer* faces) {
     Counters count;
-    for_each_model(models, [&](const Model& model, int first) {
-        count += draw_depth(model.nfaces(), DepthShader(model, camera), camera.Viewport, zbuffer, faces, first, threads);
+    for_each_model(scene.models, [&](const Model& model, int first) {
+        count += draw_depth(model.nfaces(), DepthShader(model, camera), camera.Viewport, zbuffer, faces, first, scene.opt.threads);
     });
     return count;
 }
 
-// The colour of what the viewer sees, with the shader that each material asks for. Returns the fragments shaded.
-static long draw_colors(const std::vector<Model>& models, const Camera& viewer, const vec3& light, const Shadow& shadow,
-                        const FaceBuffer& faces, TGAImage& framebuffer, int threads) {
+// Pass 1: what the light sees. Its camera is fitted to the models; a constant bias needs the lesson's own camera.
+static AnyShadow first_pass(const Scene& scene, Picture& picture) {
+    const Options& opt = scene.opt;
+    if (opt.shadow == Options::Shadow::off) return NoShadow{};
+    const bool exact = opt.shadow == Options::Shadow::exact;
+    const int size = exact ? LightGrid::good_cells(face_count(scene.models)) : opt.shadow_size;
+    Camera light = fitted_camera(scene.models, opt.light, opt.up, size);
+    if (opt.bias && !exact)
+        light = {lookat(opt.light, {}, opt.up) * translation(-opt.center), projection(0),
+                 translation({.5, .5, 0}) * middle_viewport(size, size)};
+    const Receiver receiver{light.object_to_screen()};
+    if (exact) {
+        picture.grid = LightGrid(scene.models, light, size);
+        return ExactShadow{receiver, &picture.grid};
+    }
+    picture.shadowbuffer = DepthBuffer(size, size);
+    if (opt.report) picture.casters = FaceBuffer(size, size);
+    draw_depths(scene, light, picture.shadowbuffer, opt.report ? &picture.casters : nullptr);
+    if (opt.bias) return ConstantBias{receiver, &picture.shadowbuffer, *opt.bias};
+    return ShadowMap{receiver, &picture.shadowbuffer};
+}
+
+// The colours of what the viewer sees, each material of each model with the shader that it asks for.
+template <class Shadow>
+static long draw_colors(const Scene& scene, const Shadow& shadow, const FaceBuffer& faces, TGAImage& framebuffer) {
     long shaded = 0;
-    const std::vector<char> seen = numbers_seen(faces, face_count(models));
-    for_each_model(models, [&](const Model& model, int first) {
+    const std::vector<char> seen = numbers_seen(faces, face_count(scene.models));
+    for_each_model(scene.models, [&](const Model& model, int first) {
         for (const Model::Group& group : model.groups()) {
             const Material& material = model.materials()[static_cast<std::size_t>(group.material)];
             const auto draw = [&]<Normals normals>() {
-                const PhongShader<normals> shader(model, material, viewer, light, shadow);
-                shaded += draw_color(group.begin, group.end, shader, viewer.Viewport, faces, seen, first, framebuffer, threads);
+                const PhongShader<normals, Shadow> shader(scene, model, material, shadow, first);
+                shaded += draw_color(group.begin, group.end, shader, scene.viewer.Viewport, faces, seen, first,
+                                     framebuffer, scene.opt.threads);
             };
             if (!material.normal.empty()) draw.template operator()<Normals::object>();
             else if (!material.tangent.empty()) draw.template operator()<Normals::tangent>();
@@ -182,33 +252,24 @@ static long draw_colors(const std::vector<Model>& models, const Camera& viewer, 
     return shaded;
 }
 
-static Picture render(const std::vector<Model>& models, const Options& opt) {
-    Picture picture;
-    const Camera light{lookat(opt.center + opt.light, opt.center, opt.up), projection(0),
-                       middle_viewport(opt.shadow_size, opt.shadow_size)};
-    const Camera viewer{lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
-                        middle_viewport(opt.width, opt.height)};
+// Pass 2: what the viewer sees: first which face, then its colour; each fragment asks whether the light sees it too.
+static void second_pass(const Scene& scene, const AnyShadow& any, Picture& p) {
+    p.zbuffer = DepthBuffer(scene.opt.width, scene.opt.height);
+    p.faces = FaceBuffer(scene.opt.width, scene.opt.height);
+    p.framebuffer = TGAImage(scene.opt.width, scene.opt.height, TGAImage::RGB);
+    p.count = draw_depths(scene, scene.viewer, p.zbuffer, &p.faces);
+    const auto draw = [&](const auto& shadow) { return draw_colors(scene, shadow, p.faces, p.framebuffer); };
+    p.count.shaded = std::visit(draw, any);
+}
 
-    // Pass 1: the depth of the models as the light sees them.
-    const double start = milliseconds();
-    if (opt.shadow) {
-        picture.shadowbuffer = DepthBuffer(opt.shadow_size, opt.shadow_size);
-        picture.depth_pass = draw_depths(models, light, picture.shadowbuffer, nullptr, opt.threads);
-    }
-    const double middle = milliseconds();
-
-    // Pass 2: the models as the viewer sees them. First what is nearest, then the colour of that alone, each fragment
-    // looked up in the light's picture.
-    const mat4 Mshadow = light.object_to_screen() * invert(viewer.object_to_screen()).value();
-    const Shadow shadow{opt.shadow ? &picture.shadowbuffer : nullptr, Mshadow, opt.bias};
-    picture.zbuffer = DepthBuffer(opt.width, opt.height);
-    picture.framebuffer = TGAImage(opt.width, opt.height, TGAImage::RGB);
-    FaceBuffer faces(opt.width, opt.height);
-    picture.shading_pass = draw_depths(models, viewer, picture.zbuffer, &faces, opt.threads);
-    picture.shading_pass.shaded = draw_colors(models, viewer, opt.light, shadow, faces, picture.framebuffer, opt.threads);
-    picture.depth_ms = middle - start;
-    picture.shade_ms = milliseconds() - middle;
-    return picture;
+// How far the picture is from the truth: from the same pass with the shadows that a ray caster finds.
+static std::string report(const Scene& scene, const AnyShadow& any, const Picture& p) {
+    const View view{scene.opt.eye, scene.opt.center, scene.opt.up, scene.opt.width, scene.opt.height};
+    const TruthImage truth = cast(RayCaster(scene.models), view, scene.opt.light, scene.opt.threads);
+    TGAImage exact(view.width, view.height, TGAImage::RGB);
+    draw_colors(scene, TrueShadow{truth}, p.faces, exact);
+    const auto ask = [&](const auto& shadow) { return verdicts_of(scene.models, scene.viewer, shadow, p.faces, p.casters); };
+    return report_line(truth, std::visit(ask, any), p.framebuffer, exact);
 }
 
 // ---- the command line ----
@@ -225,80 +286,64 @@ Several models share one scene. Without a model: the idol.
   --center X,Y,Z     what the viewer looks at (0,0,0)
   --up X,Y,Z         what appears upwards (0,1,0)
   --light X,Y,Z      direction towards the light (1,1,0)
-  --shadow map|off   how shadows are found (map)
-  --bias N           shadow bias in units of the depth range 2000 (43.34)
+  --shadow HOW       map: a shadow buffer; exact: the faces themselves; off (map)
+  --bias N           the lesson's shadow buffer: its camera, a constant bias of N of 2000 (43.34)
   --tangent          prefer a tangent-space normal map to an object-space one
   --no-fit           keep a model's own coordinates (default: fit what exceeds [-1,1]^3)
   --threads N        (all processors)
+  --report           print how far the shadows and the picture are from the truth
   --quiet            print nothing but errors
   --help, --version
 )";
 
-struct UsageError : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
-
-// The whole of text as a number; what says which option it belongs to.
-template <class T>
-static T number(std::string_view text, const std::string& what) {
-    T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(static_cast<double>(value)))
-        throw UsageError(what + ": \"" + std::string(text) + "\" is not a number");
-    return value;
-}
-
-static int size_within(std::string_view text, const std::string& what, int most) {
-    const int value = number<int>(text, what);
-    if (value < 1 || value > most) throw UsageError(what + ": " + std::string(text) + " is not in 1 to " + std::to_string(most));
-    return value;
-}
-
-static vec3 vector(std::string_view text, const std::string& what) {
-    vec3 v;
-    for (int i = 0; i < 3; i++) {
-        const std::size_t comma = text.find(',');
-        if ((comma == text.npos) != (i == 2)) throw UsageError(what + ": three numbers x,y,z");
-        v[i] = number<double>(text.substr(0, comma), what);
-        text.remove_prefix(comma == text.npos ? text.size() : comma + 1);
-    }
-    return v;
-}
-
 static Options parse(int argc, char** argv) {
     Options opt;
+    char rest;  // what follows the last number, which nothing should
     for (int i = 1; i < argc; i++) {
         const std::string arg = argv[i];
-        const auto value = [&]() -> std::string {
-            if (++i == argc) throw UsageError(arg + ": a value is missing");
+        const auto fail = [&](const std::string& wanted) { throw std::invalid_argument(arg + ": \"" + argv[i] + "\" is not " + wanted); };
+        const auto value = [&] {
+            if (++i == argc) throw std::invalid_argument(arg + ": a value is missing");
             return argv[i];
         };
-        if (arg == "-o") opt.out = value();
+        const auto integer = [&](int& n, int most) {
+            if (std::sscanf(value(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most) fail("1 to " + std::to_string(most));
+        };
+        const auto vector = [&](vec3& v) {
+            if (std::sscanf(value(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !std::isfinite(v.x) ||
+                !std::isfinite(v.y) || !std::isfinite(v.z))
+                fail("three numbers X,Y,Z");
+        };
+        if (arg == "--help") std::exit(std::fputs(usage_text, stdout) < 0);
+        else if (arg == "--version") std::exit(std::puts("umbra " UMBRA_VERSION) < 0);
+        else if (arg == "-o") opt.out = value();
         else if (arg == "--size") {
-            const std::string size = value();
-            const std::size_t x = size.find('x');
-            if (x == size.npos) throw UsageError(arg + ": \"" + size + "\" is not WxH");
-            opt.width = size_within(size.substr(0, x), arg, max_size);
-            opt.height = size_within(size.substr(x + 1), arg, max_size);
-        } else if (arg == "--shadow-size") opt.shadow_size = size_within(value(), arg, max_size);
-        else if (arg == "--eye") opt.eye = vector(value(), arg);
-        else if (arg == "--center") opt.center = vector(value(), arg);
-        else if (arg == "--up") opt.up = vector(value(), arg);
-        else if (arg == "--light") opt.light = vector(value(), arg);
-        else if (arg == "--bias") opt.bias = number<double>(value(), arg);
-        else if (arg == "--shadow") {
+            int &w = opt.width, &h = opt.height;
+            if (std::sscanf(value(), "%5dx%5d%c", &w, &h, &rest) != 2 || w < 1 || w > max_size || h < 1 || h > max_size)
+                fail("WxH, each 1 to " + std::to_string(max_size));
+        } else if (arg == "--shadow-size") integer(opt.shadow_size, max_size);
+        else if (arg == "--eye") vector(opt.eye);
+        else if (arg == "--center") vector(opt.center);
+        else if (arg == "--up") vector(opt.up);
+        else if (arg == "--light") vector(opt.light);
+        else if (arg == "--bias") {
+            if (std::sscanf(value(), "%lf%c", &opt.bias.emplace(), &rest) != 1 || !std::isfinite(*opt.bias)) fail("a number");
+        } else if (arg == "--shadow") {
             const std::string how = value();
-            if (how != "map" && how != "off") throw UsageError(arg + ": \"" + how + "\" is neither map nor off");
-            opt.shadow = how == "map";
+            if (how == "map") opt.shadow = Options::Shadow::map;
+            else if (how == "exact") opt.shadow = Options::Shadow::exact;
+            else if (how == "off") opt.shadow = Options::Shadow::off;
+            else fail("map, exact or off");
         } else if (arg == "--no-fit") opt.fit = false;
         else if (arg == "--tangent") opt.tangent = true;
-        else if (arg == "--threads") opt.threads = size_within(value(), arg, 256);
+        else if (arg == "--threads") integer(opt.threads, 256);
+        else if (arg == "--report") opt.report = true;
         else if (arg == "--quiet") opt.quiet = true;
-        else if (arg.size() > 1 && arg[0] == '-') throw UsageError("unknown option " + arg);
+        else if (arg.size() > 1 && arg[0] == '-') throw std::invalid_argument("unknown option " + arg);
         else opt.models.push_back(arg);
     }
-    if (opt.eye == opt.center) throw UsageError("--eye and --center are the same point");
-    if (opt.light == vec3{}) throw UsageError("--light: a direction of length zero");
+    if (opt.eye == opt.center) throw std::invalid_argument("--eye and --center are the same point");
+    if (opt.light == vec3{}) throw std::invalid_argument("--light has no direction");
     if (opt.models.empty()) opt.models.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     return opt;
 }
@@ -315,48 +360,36 @@ static std::vector<Model> load(const Options& opt) {
     return models;
 }
 
-// One line of name value pairs.
-static void summarize(const std::vector<Model>& models, const Options& opt, const Picture& p, double load_ms, double write_ms) {
-    std::set<std::string> left_out{"diffuse", "normal_map", "specular", "glow"};
-    for (const Model& model : models) {
-        for (const Material& m : model.materials()) {
-            if (!m.diffuse.empty()) left_out.erase("diffuse");
-            if (!m.normal.empty() || !m.tangent.empty()) left_out.erase("normal_map");
-            if (!m.specular.empty()) left_out.erase("specular");
-            if (!m.glow.empty()) left_out.erase("glow");
-        }
-    }
-    if (!opt.shadow) left_out.insert("shadow");
-    std::string names;
-    for (const std::string& name : left_out) names += (names.empty() ? "" : ",") + name;
-
-    long pixels = 0;
-    for (int y = 0; y < p.zbuffer.height(); y++)
-        pixels += std::count_if(p.zbuffer.row(y), p.zbuffer.row(y) + p.zbuffer.width(), [](float z) { return std::isfinite(z); });
-    const Counters& c = p.shading_pass;
-    std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
-                "outside %ld between_samples %ld hidden %ld left_out %s\n",
-                c.triangles, pixels, c.shaded, load_ms, p.depth_ms, p.shade_ms, write_ms, c.outside, c.between_samples,
-                c.covered - c.shaded, names.empty() ? "-" : names.c_str());
+static double milliseconds() {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 int main(int argc, char** argv) try {
-    for (int i = 1; i < argc; i++) {
-        if (!std::strcmp(argv[i], "--help")) return std::fputs(usage_text, stdout) < 0;
-        if (!std::strcmp(argv[i], "--version")) return std::puts("umbra " UMBRA_VERSION) < 0;
-    }
     const Options opt = parse(argc, argv);
-
     const double start = milliseconds();
-    const std::vector<Model> models = load(opt);
+    const Scene scene{opt, load(opt),
+                      {lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
+                       middle_viewport(opt.width, opt.height)}};
     const double loaded = milliseconds();
-    const Picture picture = render(models, opt);
-    const double rendered = milliseconds();
-    if (opt.shadow) depth_picture(picture.shadowbuffer).write_tga_file(opt.out / "depth.tga");
+    Picture picture;
+    const AnyShadow shadow = first_pass(scene, picture);
+    const double lit = milliseconds();
+    second_pass(scene, shadow, picture);
+    const double shaded = milliseconds();
+    if (picture.shadowbuffer.width()) depth_picture(picture.shadowbuffer).write_tga_file(opt.out / "depth.tga");
     picture.framebuffer.write_tga_file(opt.out / "framebuffer.tga");
-    if (!opt.quiet) summarize(models, opt, picture, loaded - start, milliseconds() - rendered);
-    return 0;
-} catch (const UsageError& e) {
+    const double written = milliseconds();
+    if (opt.report) std::puts(report(scene, shadow, picture).c_str());
+    if (opt.quiet) return 0;
+
+    std::string left_out = missing_maps(scene.models);
+    if (opt.shadow == Options::Shadow::off) left_out += left_out.empty() ? "shadow" : ",shadow";
+    const Counters& c = picture.count;  // a visible pixel is shaded exactly once
+    std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f shadow_bytes "
+                "%zu outside %ld between_samples %ld hidden %ld left_out %s\n", c.triangles, c.shaded, c.shaded,
+                loaded - start, lit - loaded, shaded - lit, written - shaded, picture.shadowbuffer.bytes() + picture.grid.bytes(),
+                c.outside, c.between_samples, c.covered - c.shaded, left_out.empty() ? "-" : left_out.c_str());
+} catch (const std::invalid_argument& e) {
     std::cerr << "umbra: " << e.what() << " (umbra --help lists the options)\n";
     return 2;
 } catch (const std::exception& e) {

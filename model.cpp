@@ -1,6 +1,7 @@
-// model.cpp: reads an .obj, its .mtl and the pictures they name; cuts polygons into triangles and makes missing normals.
-// It draws nothing. The formats are Wavefront's "Object Files (.obj)" and "Material Library File (.mtl)", as found in the
-// wild: what other programs write is read where its meaning is clear, and is an error with its line where it is not.
+// model.cpp: reads an .obj, its .mtl and the pictures they name; cuts polygons into triangles and makes missing
+// normals. It draws nothing. The formats are Wavefront's "Object Files (.obj)" and "Material Library File (.mtl)", as
+// found in the wild: what other programs write is read where its meaning is clear, and is an error with its line where
+// it is not.
 #include "model.h"
 
 #include <algorithm>
@@ -28,7 +29,9 @@ namespace {
 using Corner = Model::Corner;
 
 constexpr std::size_t to_size(int n) { return static_cast<std::size_t>(n); }
-constexpr int to_int(std::size_t n) { return static_cast<int>(n); }  // every array here is shorter than 2^31, see max_bytes
+constexpr int to_int(std::size_t n) {
+    return static_cast<int>(n);
+}  // every array here is shorter than 2^31, see max_bytes
 
 // ---- text, line by line and word by word ----
 
@@ -41,10 +44,12 @@ std::string printable(std::string_view text) {
 }
 std::string in_quotes(std::string_view text) { return "'" + printable(text) + "'"; }
 
-// A text file seen through a window that always holds whole lines. So a big file costs neither its size in memory nor the
-// cache misses of reading it twice: a quarter of the time of loading a big mesh. The window grows with the longest line.
+// A text file seen through a window that holds whole lines and grows with the longest. So a big file costs neither its
+// size in memory nor the cache misses of being written there and read again: a quarter of the time of loading a big
+// mesh.
 //
-// A line that ends in '\' goes on in the next one. In a comment it does not: a stray '\' there must not swallow a vertex.
+// A line that ends in '\' goes on in the next one. In a comment it does not: a stray '\' there must not swallow a
+// vertex.
 class TextFile {
 public:
     explicit TextFile(const fs::path& path) : name_(path.string()) {
@@ -85,18 +90,21 @@ public:
         return {begin, static_cast<std::size_t>(at_ - begin)};
     }
 
-    // The rest of the statement without blanks at its ends: a name may contain blanks and '#'. Valid until the next call.
+    // The rest of the statement without blanks at its ends: a name may contain blanks and '#'. Valid until the next
+    // call.
     std::string_view rest() {
         skip_blanks();
         const char* const begin = at_;
         skip_statement();
-        const char* end = at_;
-        while (end > begin && is_blank(end[-1])) end--;
-        const std::string_view text(begin, static_cast<std::size_t>(end - begin));
-        if (text.find('\n') == text.npos) return text;
-        joined_ = text;
-        for (std::size_t i = 0; (i = joined_.find('\n', i)) != joined_.npos;) joined_[joined_.rfind('\\', i)] = joined_[i] = ' ';
-        return joined_;
+        std::string_view text(begin, static_cast<std::size_t>(at_ - begin));
+        if (text.find('\n') != text.npos) {
+            joined_ = text;
+            for (std::size_t i = 0; (i = joined_.find('\n', i)) != joined_.npos;)
+                joined_[joined_.rfind('\\', i)] = joined_[i] = ' ';
+            text = joined_;
+        }
+        while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+        return text;
     }
 
     // To the end of the line, over continuations.
@@ -114,8 +122,9 @@ public:
 
     // A finite number. What underflows is zero.
     double real() {
-        // Most numbers are short: up to 15 digits make an integer below 2^53, and 10^15 is a double too, so one division
-        // rounds correctly and gives what from_chars gives, in a third of its time.
+        // Most numbers are short: up to 15 digits make an integer below 2^53, and 10^15 is a double too, so one
+        // division rounds correctly and gives what from_chars gives. It saves a seventh of the time of loading a big
+        // mesh.
         static constexpr double power_of_ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                   1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
         const char* p = at_;
@@ -146,7 +155,8 @@ public:
         const char* const first = p;
         while (is_digit(*p)) n = n * 10 + static_cast<unsigned>(*p++ - '0');
         if (p == first) fail(in_quotes(rest_of_word()) + " is no " + what);
-        if (p - first > 19 || n > INT32_MAX) fail(std::string(what) + " " + in_quotes(rest_of_word()) + " is out of range");
+        if (p - first > 19 || n > INT32_MAX)
+            fail(std::string(what) + " " + in_quotes(rest_of_word()) + " is out of range");
         at_ = p;
         return negative ? -static_cast<int>(n) : static_cast<int>(n);
     }
@@ -192,9 +202,7 @@ private:
     const char* find_newline(const char* from) const {  // there is one: the window ends with it
         return static_cast<const char*>(std::memchr(from, '\n', static_cast<std::size_t>(limit_ - from)));
     }
-    bool ends_word() const {
-        return is_blank(*at_) || *at_ == '\n' || *at_ == '#' || (*at_ == '\\' && continued(at_));
-    }
+    bool ends_word() const { return is_blank(*at_) || *at_ == '\n' || *at_ == '#' || (*at_ == '\\' && continued(at_)); }
     std::string_view rest_of_word() const {
         const char* end = at_;
         while (!is_blank(*end) && *end != '\n') end++;
@@ -206,7 +214,8 @@ private:
         double value = 0;
         const auto [end, error] = std::from_chars(first, limit_, value);
         if (error == std::errc::invalid_argument) fail(in_quotes(rest_of_word()) + " is no number");
-        if (error == std::errc::result_out_of_range) value = std::copysign(is_large(first, end) ? HUGE_VAL : 0, *first == '-' ? -1 : 1);
+        if (error == std::errc::result_out_of_range)
+            value = std::copysign(is_large(first, end) ? HUGE_VAL : 0, *first == '-' ? -1 : 1);
         if (!std::isfinite(value)) fail(in_quotes(rest_of_word()) + " is not finite");
         at_ = end;
         expect_end_of_word();
@@ -228,7 +237,8 @@ private:
             const bool negative = *++p == '-';
             std::int64_t written = 0;
             for (; p < end; p++)
-                if (is_digit(*p)) written = std::min(written * 10 + (*p - '0'), std::int64_t{1} << 40);  // beyond any length
+                if (is_digit(*p))
+                    written = std::min(written * 10 + (*p - '0'), std::int64_t{1} << 40);  // beyond any length
             exponent += negative ? -written : written;
         }
         return exponent > 0;
@@ -255,7 +265,8 @@ private:
             if ((total_ += n) > max_bytes) throw std::runtime_error(name_ + ": is larger than 4 GiB");
             filled += n;
             at_ = window_.get();
-            if (total_ == n && n >= 3 && std::memcmp(at_, "\xEF\xBB\xBF", 3) == 0) at_ += 3;  // UTF-8's byte order mark
+            if (line_ == 1 && filled >= 3 && std::memcmp(at_, "\xEF\xBB\xBF", 3) == 0)
+                at_ += 3;     // UTF-8's byte order mark
             if (n < chunk) {  // the end; two newlines, so that even a '\' there has a line to go on in
                 window_[filled] = window_[filled + 1] = '\n';
                 end_ = limit_ = window_.get() + filled + 2;
@@ -346,8 +357,8 @@ public:
         const std::size_t counts[] = {obj_.verts.size(), obj_.uvs.size(), obj_.normals.size()};
         for (const Forward& f : forward_)
             if (to_size(f.index) > counts[f.kind])
-                in_.fail(f.line, std::string(kinds[f.kind]) + " " + std::to_string(f.index) + ", but the file has only " +
-                                     std::to_string(counts[f.kind]));
+                in_.fail(f.line, std::string(kinds[f.kind]) + " " + std::to_string(f.index) +
+                                     ", but the file has only " + std::to_string(counts[f.kind]));
         return std::move(obj_);
     }
 
@@ -361,7 +372,8 @@ private:
     };
 
     // A full array grows to what it would be if the rest of the file were like the part since its first element, within
-    // 2 to 16 times its size: far less copying and touching of fresh memory than by doubling, a tenth of the loading time.
+    // 2 to 16 times its size. Less is copied than by doubling, and less fresh memory touched: a seventh of the loading
+    // time.
     template <typename T>
     void append(std::vector<T>& array, std::uintmax_t& began, const T& value) {
         const std::size_t n = array.size();
@@ -414,7 +426,9 @@ private:
         return to_int(count) + i;
     }
     Corner corner() {  // v, v/vt, v//vn or v/vt/vn; v/ and v// are seen too
-        const auto given = [this] { return in_.peek() == '-' || in_.peek() == '+' || (in_.peek() >= '0' && in_.peek() <= '9'); };
+        const auto given = [this] {
+            return in_.peek() == '-' || in_.peek() == '+' || (in_.peek() >= '0' && in_.peek() <= '9');
+        };
         Corner c{index(vertex, obj_.verts.size()), -1, -1};
         if (in_.skip('/')) {
             if (given()) c.uv = index(texture, obj_.uvs.size());
@@ -430,7 +444,8 @@ private:
         const int begin = to_int(obj_.corners.size() / 3);
         for (in_.skip_blanks(); !in_.at_end(); in_.skip_blanks()) {
             const Corner c = corner();
-            if (n >= 2) for (const Corner& each : {first, previous, c}) append(obj_.corners, corners_began_, each);
+            if (n >= 2)
+                for (const Corner& each : {first, previous, c}) append(obj_.corners, corners_began_, each);
             if (n++ == 0) first = c;
             previous = c;
         }
@@ -446,7 +461,8 @@ private:
     TextFile in_;
     fs::path path_;
     std::uintmax_t file_size_ = 0;
-    std::uintmax_t verts_began_ = 0, uvs_began_ = 0, normals_began_ = 0, corners_began_ = 0;  // bytes before the first one
+    std::uintmax_t verts_began_ = 0, uvs_began_ = 0, normals_began_ = 0,
+                   corners_began_ = 0;  // bytes before the first one
     Obj obj_;
     std::vector<Forward> forward_;
 };
@@ -470,25 +486,26 @@ double area2(const vec2& a, const vec2& b, const vec2& c) {
 // that is right, and else ear clipping (G. H. Meisters, "Polygons have ears", 1975). An ear is a corner with a convex
 // angle whose triangle no reflex corner lies in; cutting it off changes only whether its two neighbours are ears.
 //
-// The reflex corners are kept in a k-d tree, so a test usually looks at some ten to a hundred nodes instead of all corners:
-// 100 000 corners take a tenth of a second. Where it does not (a fine staircase askew to the axes is the worst case known),
-// the work is bounded all the same: a model has 2^28 nodes (seconds) and 100 per corner; what is left then becomes a fan.
+// The reflex corners are kept in a k-d tree, so a test usually looks at some ten to a hundred nodes instead of all
+// corners: 100 000 corners take a tenth of a second. Where it does not (a fine staircase askew to the axes is the worst
+// case known), the work is bounded all the same: a model has 2^28 nodes (seconds) and 100 per corner; what is left then
+// becomes a fan.
 class PolygonCutter {
 public:
-    // FAN holds the polygon (c0, c1, c2, ...) as the triangles (c0,c1,c2), (c0,c2,c3), ... and receives the triangles. They
-    // wind as the polygon does. Returns false where the polygon crosses itself, or was too much work, so that a part of it
-    // is still a fan. A polygon without area stays a fan, too.
+    // FAN holds the polygon (c0, c1, c2, ...) as the triangles (c0,c1,c2), (c0,c2,c3), ... and receives the triangles.
+    // They wind as the polygon does. Returns false where the polygon crosses itself, or was too much work, so that a
+    // part of it is still a fan. A polygon without area stays a fan, too.
     bool cut(const std::vector<vec3>& verts, Corner* fan, int n) {
         corners_.assign({fan[0], fan[1]});
-        for (int i = 0; i < n - 2; i++) corners_.push_back(fan[3 * i + 2]);
+        for (int i = 0; i < n - 2; i++) corners_.push_back(fan[3 * std::ptrdiff_t{i} + 2]);
         if (!project(verts) || is_good_fan()) return true;
         return clip_ears(fan);
     }
 
 private:
     // Fills points_: the corners seen along the axis that is nearest to the normal, so that the polygon runs
-    // counterclockwise. Unlike a turn into the plane, leaving out a coordinate rounds nothing: three corners on a line stay
-    // on it. False where there is no area.
+    // counterclockwise. Unlike a turn into the plane, leaving out a coordinate rounds nothing: three corners on a line
+    // stay on it. False where there is no area.
     bool project(const std::vector<vec3>& verts) {
         const auto vert = [&](std::size_t i) { return verts[to_size(corners_[i].vert)]; };
         double extent = 0;
@@ -512,7 +529,8 @@ private:
         const int axis = std::fabs(newell.z) == area ? 2 : std::fabs(newell.y) == area ? 1 : 0;
         const int right = (axis + 1) % 3, up = (axis + 2) % 3;
         points_.clear();
-        for (const vec3& p : relative_) points_.push_back(newell[axis] > 0 ? vec2{p[right], p[up]} : vec2{p[up], p[right]});
+        for (const vec3& p : relative_)
+            points_.push_back(newell[axis] > 0 ? vec2{p[right], p[up]} : vec2{p[up], p[right]});
         return true;
     }
 
@@ -581,7 +599,8 @@ private:
                 enqueue(neighbour);
             }
         }
-        for (int a = next_[to_size(some)]; next_[to_size(a)] != some; a = next_[to_size(a)]) emit(some, a, next_[to_size(a)]);
+        for (int a = next_[to_size(some)]; next_[to_size(a)] != some; a = next_[to_size(a)])
+            emit(some, a, next_[to_size(a)]);
         return left == 3;
     }
 
@@ -589,11 +608,12 @@ private:
         return area2(points_[to_size(previous_[to_size(v)])], points_[to_size(v)], points_[to_size(next_[to_size(v)])]);
     }
 
-    // A corner without area that is not between its neighbours: the tip of a spike, or a point twice. It can be cut off at
-    // any time, and must be before an ear is cut beside it, because that would be outside the polygon.
+    // A corner without area that is not between its neighbours: the tip of a spike, or a point twice. It can be cut off
+    // at any time, and must be before an ear is cut beside it, because that would be outside the polygon.
     bool is_spike(int v) const {
         const vec2 p = points_[to_size(v)];
-        return turn(v) == 0 && dot(points_[to_size(previous_[to_size(v)])] - p, points_[to_size(next_[to_size(v)])] - p) >= 0;
+        return turn(v) == 0 &&
+               dot(points_[to_size(previous_[to_size(v)])] - p, points_[to_size(next_[to_size(v)])] - p) >= 0;
     }
     bool is_ear(int v, bool touching_allowed) {
         if (!(turn(v) > 0)) return is_spike(v);
@@ -642,9 +662,10 @@ private:
             most = {std::max(most.x, p.x), std::max(most.y, p.y)};
         }
         const int axis = most.x - least.x < most.y - least.y ? 1 : 0;  // across the longer side
-        std::nth_element(tree_.begin() + low, tree_.begin() + middle, tree_.begin() + high, [&](const Node& a, const Node& b) {
-            return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.corner < b.corner;
-        });
+        std::nth_element(
+            tree_.begin() + low, tree_.begin() + middle, tree_.begin() + high, [&](const Node& a, const Node& b) {
+                return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.corner < b.corner;
+            });
         Node& root = tree_[to_size(middle)];
         root.low = least;
         root.high = most;
@@ -672,15 +693,16 @@ private:
         if (node.reflex == 0) return false;
         work_--;
         if (high_.x < node.low.x || low_.x > node.high.x || high_.y < node.low.y || low_.y > node.high.y) return false;
-        // Nothing is inside if even the innermost corner of the box is outside an edge. Since rounding is monotonic, what
-        // is computed for that corner is not below what blocks() computes for any point of the box.
+        // Nothing is inside if even the innermost corner of the box is outside an edge. Since rounding is monotonic,
+        // what is computed for that corner is not below what blocks() computes for any point of the box.
         for (std::size_t i = 0; i < 3; i++) {
             const vec2 &a = triangle_[i], &b = triangle_[(i + 1) % 3];
             const vec2 innermost{b.y > a.y ? node.low.x : node.high.x, b.x > a.x ? node.high.y : node.low.y};
             const double inside = area2(a, b, innermost);
             if (touching_allowed_ ? inside <= 0 : inside < 0) return false;
         }
-        return (reflex_[to_size(node.corner)] && blocks(node.point)) || is_any_inside(low, middle) || is_any_inside(middle + 1, high);
+        return (reflex_[to_size(node.corner)] && blocks(node.point)) || is_any_inside(low, middle) ||
+               is_any_inside(middle + 1, high);
     }
     bool blocks(const vec2& p) const {  // a corner of the triangle itself does not, nor one at the same place
         const auto& [a, b, c] = triangle_;
@@ -734,16 +756,17 @@ Face measure(const vec3& a, const vec3& b, const vec3& c) {
         return {};
 
     Face face{normalized(across)};
-    const double area = norm(across);  // twice; of any two edges, it is the product of their lengths and the sine between
+    const double area =
+        norm(across);  // twice; of any two edges, it is the product of their lengths and the sine between
     face.angles[i] = std::atan2(area, -dot(longest, last));
     face.angles[(i + 1) % 3] = std::atan2(area, -dot(next, longest));
     face.angles[(i + 2) % 3] = std::numbers::pi - face.angles[i] - face.angles[(i + 1) % 3];
     return face;
 }
 
-// Gives a normal to each corner without one, or with one of no length: the mean of the normals of the faces around its vertex, each weighted by its
-// angle there (G. Thuermer and C. Wuethrich, "Computing vertex normals from polygonal facets", 1998), which does not
-// depend on how the polygons have been cut.
+// Gives a normal to each corner without one, or with one of no length: the mean of the normals of the faces around its
+// vertex, each weighted by its angle there (G. Thuermer and C. Wuethrich, "Computing vertex normals from polygonal
+// facets", 1998), which does not depend on how the polygons have been cut.
 void make_normals(const std::vector<vec3>& verts, std::vector<Corner>& corners, std::vector<vec3>& normals) {
     for (Corner& c : corners)
         if (c.normal >= 0 && normals[to_size(c.normal)] == vec3{}) c.normal = -1;
@@ -755,7 +778,8 @@ void make_normals(const std::vector<vec3>& verts, std::vector<Corner>& corners, 
     };
     std::vector<Sum> sums(verts.size());
     const auto face_of = [&](std::size_t first) {
-        return measure(verts[to_size(corners[first].vert)], verts[to_size(corners[first + 1].vert)], verts[to_size(corners[first + 2].vert)]);
+        return measure(verts[to_size(corners[first].vert)], verts[to_size(corners[first + 1].vert)],
+                       verts[to_size(corners[first + 2].vert)]);
     };
     for (std::size_t first = 0; first < corners.size(); first += 3) {
         const Face face = face_of(first);
@@ -767,8 +791,9 @@ void make_normals(const std::vector<vec3>& verts, std::vector<Corner>& corners, 
         }
     }
 
-    // A sum of n terms is off by at most n half-units of the sum of their sizes, its terms themselves by less than 4 units
-    // each. No more than that is left where the faces cancel, as on the two sides of a sheet: then a face has its own normal.
+    // A sum of n terms is off by at most n half-units of the sum of their sizes, its terms themselves by less than 4
+    // units each. No more than that is left where the faces cancel, as on the two sides of a sheet: then a face has its
+    // own normal.
     const auto mean = [&](Sum& sum) {
         if (sum.index == -1) {
             const double noise = (sum.faces + 4) * sum.angles * std::numeric_limits<double>::epsilon();
@@ -845,8 +870,8 @@ bool is_number(std::string_view word) {
     return error != std::errc::invalid_argument && end == word.data() + word.size();
 }
 
-// What is left of "-bm 1 -s 2 2 2 the file.tga" without the options. What looks like an option but is none of the format's
-// belongs to the name.
+// What is left of "-bm 1 -s 2 2 2 the file.tga" without the options. What looks like an option but is none of the
+// format's belongs to the name.
 std::string_view without_options(std::string_view text) {
     for (;;) {
         std::string_view rest = text;
@@ -880,7 +905,8 @@ vec3 read_Kd(TextFile& in, Notes& notes, const fs::path& library) {
     if (in.peek() == 's' || in.peek() == 'x') {
         const std::string word(in.word());
         if (word != "spectral" && word != "xyz") in.fail(in_quotes(word) + " is no number");
-        notes.add(library.filename().string() + ":" + std::to_string(in.line()) + ": Kd " + word + " is not known, white is used");
+        notes.add(library.filename().string() + ":" + std::to_string(in.line()) + ": Kd " + word +
+                  " is not known, white is used");
         in.skip_statement();
         return {1, 1, 1};
     }
@@ -1008,33 +1034,50 @@ TGAImage widened(const TGAImage& grey) {
 // Fills the materials' maps: from their .mtl, and where that has none, from the pictures beside the model.
 class Texturing {
 public:
-    Texturing(const fs::path& obj, NormalMap wanted, Notes& notes) : obj_(obj), wanted_(wanted), notes_(notes) {}
+    Texturing(const fs::path& obj, NormalMap wanted, Notes& notes) : obj_(obj), wanted_(wanted), notes_(notes) {
+        const auto if_there = [&](const char* suffix) {
+            fs::path path = obj;
+            path.replace_extension();
+            path += suffix;
+            std::error_code ignored;
+            return fs::exists(path, ignored) ? path : fs::path();
+        };
+        beside_ = {if_there("_diffuse.tga"), if_there("_nm.tga"), if_there("_nm_tangent.tga"), if_there("_spec.tga"),
+                   if_there("_glow.tga")};
+    }
 
     // Notes what the material needs. MTL is null for the default material.
     void plan(std::size_t material, const MtlMaterial* mtl, const std::string& name, bool has_uvs) {
         std::array<fs::path, map_count> named;
         if (mtl)
             for (std::size_t i = 0; i < map_count; i++) named[i] = usable(*mtl, mtl->maps[i]);
-        const auto first_of = [](const fs::path& a, const fs::path& b) { return a.empty() ? b : a; };
-        const fs::path diffuse = first_of(named[diffuse_map], suffixed("_diffuse.tga"));
-        const fs::path specular = first_of(named[specular_map], suffixed("_spec.tga"));
-        const fs::path glow = first_of(named[glow_map], suffixed("_glow.tga"));
-        fs::path object = suffixed("_nm.tga");
-        fs::path tangent = first_of(first_of(named[normal_map], named[bump_map]), suffixed("_nm_tangent.tga"));
-        if (!object.empty() && !tangent.empty()) (wanted_ == NormalMap::object ? tangent : object).clear();
+        if (named[normal_map].empty()) named[normal_map] = named[bump_map];
 
-        const std::pair<const fs::path&, TGAImage Material::*> maps[] = {{diffuse, &Material::diffuse},
-                                                                         {object, &Material::normal},
-                                                                         {tangent, &Material::tangent},
-                                                                         {specular, &Material::specular},
-                                                                         {glow, &Material::glow}};
+        Maps maps = beside_;
+        const auto prefer = [](fs::path& map, const fs::path& other) {
+            if (!other.empty()) map = other;
+        };
+        prefer(maps.diffuse, named[diffuse_map]);
+        prefer(maps.tangent, named[normal_map]);
+        prefer(maps.specular, named[specular_map]);
+        prefer(maps.glow, named[glow_map]);
+        if (!maps.object.empty() && !maps.tangent.empty())
+            (wanted_ == NormalMap::object ? maps.tangent : maps.object).clear();
+
         bool left_out = false;
-        for (const auto& [path, slot] : maps) {
-            if (path.empty()) continue;
+        const auto use = [&](const fs::path& path, TGAImage Material::*slot) {
+            if (path.empty()) return;
             if (has_uvs) uses_.push_back({files_.add(path), material, slot});
             else left_out = true;
-        }
-        if (left_out) notes_.add((name.empty() ? "" : "material " + in_quotes(name) + ": ") + "no texture coordinates, so no textures");
+        };
+        use(maps.diffuse, &Material::diffuse);
+        use(maps.object, &Material::normal);
+        use(maps.tangent, &Material::tangent);
+        use(maps.specular, &Material::specular);
+        use(maps.glow, &Material::glow);
+        if (left_out)
+            notes_.add((name.empty() ? "" : "material " + in_quotes(name) + ": ") +
+                       "no texture coordinates, so no textures");
     }
 
     void load(std::vector<Material>& materials) const {
@@ -1047,14 +1090,17 @@ public:
             TGAImage& map = materials[use.material].*use.slot;
             const bool grey = image.bytespp() == 1, last = --users[to_size(use.file)] == 0;
             if (grey && (use.slot == &Material::normal || use.slot == &Material::tangent)) {
-                notes_.add(files_.list()[to_size(use.file)].filename().string() + " is grey, so no normal map: left out");
+                notes_.add(files_.list()[to_size(use.file)].filename().string() +
+                           " is grey, so no normal map: left out");
                 continue;
             }
             const bool widen = grey && use.slot != &Material::specular;
-            if (!last) copied += static_cast<std::uint64_t>(image.width()) * static_cast<std::uint64_t>(image.height()) *
-                                 (widen ? 3 : static_cast<std::uint64_t>(image.bytespp()));
+            if (!last)
+                copied += static_cast<std::uint64_t>(image.width()) * static_cast<std::uint64_t>(image.height()) *
+                          (widen ? 3 : static_cast<std::uint64_t>(image.bytespp()));
             if (copied > max_copied)
-                throw std::runtime_error(obj_.string() + ": its materials share pictures that would take more than 1 GiB in copies");
+                throw std::runtime_error(obj_.string() +
+                                         ": its materials share pictures that would take more than 1 GiB in copies");
             if (widen) map = widened(image);
             else if (last) map = std::move(image);
             else map = image;
@@ -1068,20 +1114,16 @@ private:
         std::size_t material;
         TGAImage Material::*slot;
     };
-
-    fs::path suffixed(const char* suffix) const {  // empty where there is no such file
-        fs::path path = obj_;
-        path.replace_extension();
-        path += suffix;
-        std::error_code ignored;
-        return fs::exists(path, ignored) ? path : fs::path();
-    }
+    struct Maps {  // empty where there is none
+        fs::path diffuse, object, tangent, specular, glow;
+    };
 
     // The path of a map that can be loaded; else it is empty, with a note.
     fs::path usable(const MtlMaterial& mtl, const MtlMaterial::Name& name) const {
         if (name.file.empty()) return {};
         const auto note = [&](const char* what) {
-            notes_.add(mtl.library.filename().string() + ":" + std::to_string(name.line) + ": " + printable(name.file) + what);
+            notes_.add(mtl.library.filename().string() + ":" + std::to_string(name.line) + ": " + printable(name.file) +
+                       what);
         };
         const fs::path path = beside(mtl.library, name.file);
         std::string extension = path.extension().string();
@@ -1097,6 +1139,7 @@ private:
     fs::path obj_;
     NormalMap wanted_;
     Notes& notes_;
+    Maps beside_;  // the pictures beside the model
     TextureFiles files_;
     std::vector<Use> uses_;
 };
@@ -1109,7 +1152,8 @@ struct Piece {  // the faces [begin,end) of the file share a material
 
 // Fills MATERIALS with those that faces use, in the order of their first face. What the .mtl does not define is all one
 // default material, without a name.
-std::vector<Piece> assign_materials(const Obj& obj, const MtlMaterials& library, std::vector<Material>& materials, Notes& notes) {
+std::vector<Piece> assign_materials(const Obj& obj, const MtlMaterials& library, std::vector<Material>& materials,
+                                    Notes& notes) {
     const std::vector<std::string>& names = obj.materials.list();
     std::vector<int> index(names.size(), -1);
     int default_index = -1;
@@ -1121,7 +1165,8 @@ std::vector<Piece> assign_materials(const Obj& obj, const MtlMaterials& library,
         int& known = name < 0 ? default_index : index[to_size(name)];
         if (known < 0) {
             const auto found = name < 0 ? library.end() : library.find(names[to_size(name)]);
-            if (name >= 0 && found == library.end()) notes.add("there is no material " + in_quotes(names[to_size(name)]));
+            if (name >= 0 && found == library.end())
+                notes.add("there is no material " + in_quotes(names[to_size(name)]));
             int& slot = found == library.end() ? default_index : known;
             if (slot < 0) {
                 slot = to_int(materials.size());
@@ -1146,7 +1191,8 @@ std::vector<Model::Group> group_by_material(std::vector<Piece> pieces, std::vect
         std::vector<Corner> sorted;
         sorted.reserve(corners.size());
         for (const Piece& p : pieces)
-            sorted.insert(sorted.end(), corners.begin() + 3 * std::ptrdiff_t{p.begin}, corners.begin() + 3 * std::ptrdiff_t{p.end});
+            sorted.insert(sorted.end(), corners.begin() + 3 * std::ptrdiff_t{p.begin},
+                          corners.begin() + 3 * std::ptrdiff_t{p.end});
         corners = std::move(sorted);
     }
     std::vector<Model::Group> groups;
@@ -1181,8 +1227,9 @@ Model::Model(const fs::path& path, NormalMap wanted) {
     for (const Group& g : groups_) {
         const Material& material = materials_[to_size(g.material)];
         const auto found = library.find(material.name);
-        const bool has_uvs = std::any_of(obj.corners.begin() + 3 * std::ptrdiff_t{g.begin}, obj.corners.begin() + 3 * std::ptrdiff_t{g.end},
-                                         [](const Corner& c) { return c.uv >= 0; });
+        const bool has_uvs =
+            std::any_of(obj.corners.begin() + 3 * std::ptrdiff_t{g.begin},
+                        obj.corners.begin() + 3 * std::ptrdiff_t{g.end}, [](const Corner& c) { return c.uv >= 0; });
         texturing.plan(to_size(g.material), found != library.end() ? &found->second : nullptr, material.name, has_uvs);
     }
     texturing.load(materials_);
@@ -1207,8 +1254,8 @@ bool Model::fit() {
     const double extent = std::max(largest(low), largest(high));
     if (extent <= 1) return false;
 
-    // First by a power of two, so that the largest coordinate is in [1,2) and nothing overflows. From there on the numbers
-    // are the same whatever power of two the model is multiplied by, and so are their roundings.
+    // First by a power of two, so that the largest coordinate is in [1,2) and nothing overflows. From there on the
+    // numbers are the same whatever power of two the model is multiplied by, and so are their roundings.
     const double unit = std::scalbn(1., -std::ilogb(extent));
     low = low * unit;
     high = high * unit;
@@ -1221,4 +1268,22 @@ bool Model::fit() {
         for (int i = 0; i < 3; i++) v[i] = std::clamp(v[i], -1., 1.);  // what no face uses may be anywhere
     }
     return true;
+}
+
+std::string missing_maps(const std::vector<Model>& models) {
+    const auto used = [&](auto&& has) {
+        for (const Model& model : models)
+            for (const Material& m : model.materials())
+                if (has(m)) return true;
+        return false;
+    };
+    std::string names;
+    const auto check = [&](const char* name, auto&& has) {
+        if (!used(has)) names += (names.empty() ? "" : ",") + std::string(name);
+    };
+    check("diffuse", [](const Material& m) { return !m.diffuse.empty(); });
+    check("normal_map", [](const Material& m) { return !m.normal.empty() || !m.tangent.empty(); });
+    check("specular", [](const Material& m) { return !m.specular.empty(); });
+    check("glow", [](const Material& m) { return !m.glow.empty(); });
+    return names;
 }

@@ -38,8 +38,8 @@ public:
 
     // Reads an .obj and the textures beside it. Throws std::runtime_error "FILE:LINE: what" (LINE counts from 1),
     // "FILE: what" for a file that cannot be read or has no face, and what TGAImage::read_tga_file throws.
-    // Memory is bounded by a constant times the size of the files, plus 1 GiB for pictures that several materials share
-    // (each has its own copy; more than that is an error). Textures are not decoded for faces without texture coordinates.
+    // Memory is bounded by a constant times the size of the files, plus 1 GiB for copies of pictures that materials share
+    // (more is an error). Textures are not decoded for faces without texture coordinates.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
 
     // What the user may want to know and is no error, one line each without the file's name at its head.
@@ -71,3 +71,6 @@ private:
     std::vector<Group> groups_;
     std::vector<std::string> notes_;
 };
+
+// The names of the kinds of map that no material of any model has, with commas between them.
+std::string missing_maps(const std::vector<Model>& models);

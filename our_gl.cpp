@@ -37,6 +37,25 @@ int face_count(const std::vector<Model>& models) {
     return n;
 }
 
+Camera fitted_camera(const std::vector<Model>& models, const vec3& direction, const vec3& up, int size) {
+    constexpr double inf = std::numeric_limits<double>::infinity();
+    Camera camera{lookat(direction, {}, up), mat4::identity(), viewport(0, 0, size, size)};
+    vec3 low{inf, inf, inf}, high{-inf, -inf, -inf};
+    for (const Model& model : models) {
+        for (int corner = 0; corner < model.nfaces() * 3; corner++) {
+            const vec3 p = (camera.ModelView * point(model.vert(corner / 3, corner % 3))).xyz();
+            for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+        }
+    }
+    for (int i = 0; i < 3; i++) {  // the box [low,high] to [-1,1]^3
+        const double half = (high[i] - low[i]) / 2;
+        if (!(half > 0)) continue;  // no extent: any scale will do
+        camera.Projection[i][i] = 1 / half;
+        camera.Projection[i][3] = -(low[i] + half) / half;
+    }
+    return camera;
+}
+
 TGAImage depth_picture(const DepthBuffer& depths) {
     constexpr float nothing = -std::numeric_limits<float>::infinity();
     constexpr double darkest = 32, white = 255;
@@ -206,4 +225,88 @@ std::vector<char> numbers_seen(const FaceBuffer& faces, int count) {
         for (int x = 0; x < faces.width(); x++)
             if (const std::int32_t number = faces.row(y)[x]; number >= 0) seen[static_cast<std::size_t>(number)] = 1;
     return seen;
+}
+
+LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int cells) : cells_(cells) {
+    const int faces = face_count(models);
+    corners_.reserve(static_cast<std::size_t>(faces) * 3);
+    const mat4 to_screen = light.object_to_screen();
+    for (const Model& model : models)
+        for (int corner = 0; corner < model.nfaces() * 3; corner++)
+            corners_.push_back(project(to_screen * point(model.vert(corner / 3, corner % 3))));
+    const auto cell_of = [&](double v) { return std::clamp(static_cast<int>(std::floor(v)), 0, cells_ - 1); };
+    // The cells that a face touches: those of its box that lie on the inner side of its three edges, at least in part.
+    // A face that the light sees edge-on casts no shadow.
+    const auto for_each_cell = [&](int face, auto&& visit) {
+        const vec3* const p = &corners_[static_cast<std::size_t>(face) * 3];
+        const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
+        if (!(area != 0)) return;
+        const double side = area < 0 ? -1 : 1;
+        const int x0 = cell_of(std::min({p[0].x, p[1].x, p[2].x})), x1 = cell_of(std::max({p[0].x, p[1].x, p[2].x}));
+        const int y0 = cell_of(std::min({p[0].y, p[1].y, p[2].y})), y1 = cell_of(std::max({p[0].y, p[1].y, p[2].y}));
+        for (int y = y0; y <= y1; y++) {
+            for (int x = x0; x <= x1; x++) {
+                bool outside = false;
+                for (int i = 0; i < 3 && !outside; i++) {
+                    const vec3 &a = p[i], &b = p[(i + 1) % 3];
+                    // The cell's corner farthest inwards. Rounding of the products is below 2^-50 of their size.
+                    const double nx = side * (a.y - b.y), ny = side * (b.x - a.x);
+                    const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
+                    outside = nx * dx + ny * dy < -(std::fabs(nx * dx) + std::fabs(ny * dy)) * 0x1p-48;
+                }
+                if (!outside) visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(x));
+            }
+        }
+    };
+    // Count, sum up, fill: a list for each cell in one array.
+    const std::size_t count = static_cast<std::size_t>(cells_) * static_cast<std::size_t>(cells_);
+    first_.assign(count + 2, 0);
+    for (int f = 0; f < faces; f++) for_each_cell(f, [&](std::size_t c) { first_[c + 2]++; });
+    for (std::size_t c = 2; c < first_.size(); c++) first_[c] += first_[c - 1];
+    entries_.resize(first_.back());
+    for (int f = 0; f < faces; f++) {
+        const vec3* const p = &corners_[static_cast<std::size_t>(f) * 3];
+        const float zmax = std::nextafter(static_cast<float>(std::max({p[0].z, p[1].z, p[2].z})), INFINITY);
+        for_each_cell(f, [&](std::size_t c) { entries_[first_[c + 1]++] = {zmax, f}; });
+    }
+    first_.pop_back();
+    for (std::size_t c = 0; c < count; c++)
+        std::sort(entries_.begin() + first_[c], entries_.begin() + first_[c + 1], [](const Entry& a, const Entry& b) {
+            return a.zmax != b.zmax ? a.zmax > b.zmax : a.face < b.face;
+        });
+    for (const vec3& p : corners_) zmax_ = std::max(zmax_, std::fabs(p.z));
+}
+
+std::size_t LightGrid::bytes() const {
+    return corners_.size() * sizeof(vec3) + first_.size() * sizeof(first_[0]) + entries_.size() * sizeof(Entry);
+}
+
+bool LightGrid::shadows(const vec3& p, int number) const {
+    if (!(p.x >= 0 && p.y >= 0 && p.x < cells_ && p.y < cells_)) return false;  // beside all casters
+    const std::size_t c = static_cast<std::size_t>(p.y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(p.x);
+    for (std::uint32_t i = first_[c]; i < first_[c + 1]; i++) {
+        const Entry& e = entries_[i];
+        if (static_cast<double>(e.zmax) <= p.z) return false;  // nor do those that follow reach higher
+        if (e.face != number && covers(e.face, p)) return true;
+    }
+    return false;
+}
+
+// Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are the
+// barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls through.
+bool LightGrid::covers(int face, const vec3& p) const {
+    const vec3* const q = &corners_[static_cast<std::size_t>(face) * 3];
+    const vec3 a = q[0] - p, b = q[1] - p, c = q[2] - p;
+    const double u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
+    const bool left = u >= 0 && v >= 0 && w >= 0, right = u <= 0 && v <= 0 && w <= 0;
+    if (!left && !right) return false;
+    const double above = (u * a.z + v * b.z + w * c.z) * (left ? 1 : -1);  // height over p times twice the area
+    if (!(above > 0)) return false;
+    // A face in the plane of p's own, its neighbour on a flat wall, is above p by rounding alone. Corners and p are known to
+    // eps of their size (cells_ sideways, zmax_ in height): with r and h the largest of the differences sideways and in
+    // height, an area is off by 4 r (cells_ + r) eps, and the sum by what follows.
+    constexpr double eps = std::numeric_limits<double>::epsilon();
+    double r = 0, h = 0;
+    for (const vec3& d : {a, b, c}) r = std::max({r, std::fabs(d.x), std::fabs(d.y)}), h = std::max(h, std::fabs(d.z));
+    return above > eps * (12 * r * (cells_ + r) * h + 4 * std::fabs(u + v + w) * (zmax_ + h));
 }

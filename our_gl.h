@@ -51,6 +51,9 @@ struct Camera {
 
 int face_count(const std::vector<Model>& models);
 
+// The orthographic camera that looks along -direction and shows all models as large as its size x size pixels allow.
+Camera fitted_camera(const std::vector<Model>& models, const vec3& direction, const vec3& up, int size);
+
 // ---- the z-buffer ----
 
 constexpr int max_size = 16384;  // pixels a side; the range of the integer edge functions below rests on it
@@ -60,19 +63,24 @@ template <class T>
 class Buffer {
 public:
     Buffer() = default;
-    Buffer(int width, int height, T value) : w_(width), h_(height) {  // 1 to max_size a side, or std::invalid_argument
+    Buffer(int width, int height, T empty) : w_(width), h_(height), empty_(empty) {  // 1 to max_size a side, or std::invalid_argument
         if (w_ < 1 || h_ < 1 || w_ > max_size || h_ > max_size)
             throw std::invalid_argument("a buffer has 1 to 16384 pixels a side");
-        cells_.assign(static_cast<std::size_t>(w_) * static_cast<std::size_t>(h_), value);
+        cells_.assign(static_cast<std::size_t>(w_) * static_cast<std::size_t>(h_), empty);
     }
     int width() const { return w_; }
     int height() const { return h_; }
-    bool inside(int x, int y) const { return x >= 0 && y >= 0 && x < w_ && y < h_; }
+    std::size_t bytes() const { return cells_.size() * sizeof(T); }
+    // Of the pixel that the point (x,y) lies in; outside of the buffer there is nothing.
+    T at(double x, double y) const {
+        return x >= 0 && y >= 0 && x < w_ && y < h_ ? row(static_cast<int>(y))[static_cast<int>(x)] : empty_;
+    }
     T* row(int y) { return cells_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(w_); }
     const T* row(int y) const { return cells_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(w_); }
 
 private:
     int w_ = 0, h_ = 0;
+    T empty_{};
     std::vector<T> cells_;
 };
 
@@ -81,6 +89,9 @@ struct DepthBuffer : Buffer<float> {
     DepthBuffer() = default;
     DepthBuffer(int width, int height) : Buffer(width, height, -std::numeric_limits<float>::infinity()) {}
 };
+
+// The most that a depth of the buffer differs from the exact one: half a unit in the last place of a float below 2048.
+constexpr double depth_rounding = 1. / (1 << 14);
 
 // The number of the face that is nearest, -1 where nothing was drawn.
 struct FaceBuffer : Buffer<std::int32_t> {
@@ -123,6 +134,18 @@ struct IShader {
     virtual vec4 vertex(int face, int corner) = 0;                   // the corner in clip space; may note varyings
     virtual TGAColor fragment(const Fragment&) const { return {}; }  // not called in a pass that wants depth alone
 };
+
+// A varying at a fragment: its values at the corners, weighted.
+template <class T>
+T interpolated(const T (&varying)[3], const vec3& bar) {
+    return varying[0] * bar.x + varying[1] * bar.y + varying[2] * bar.z;
+}
+
+// The texel of a normal map as a vector: (r,g,b) from [0,255] to [-1,1].
+inline vec3 sample_normal(const TGAImage& map, const vec2& uv) {
+    const std::uint8_t* const bgr = sample2D(map, uv);
+    return {bgr[2] * 2 / 255. - 1, bgr[1] * 2 / 255. - 1, bgr[0] * 2 / 255. - 1};
+}
 
 // ---- triangles ----
 
@@ -301,7 +324,8 @@ Counters for_each_face(int begin, int end, const Shader& shader, const mat4& Vie
     return total;
 }
 
-// The depth of a model's nfaces faces and, in faces, their numbers counted from first_number; faces may be null.
+// What is nearest of a model with nfaces faces: the depth and, in faces unless it is null, the face's number, counted from
+// first_number.
 template <class Shader>
 Counters draw_depth(int nfaces, const Shader& shader, const mat4& Viewport, DepthBuffer& zbuffer, FaceBuffer* faces,
                     int first_number, int threads) {
@@ -310,6 +334,13 @@ Counters draw_depth(int nfaces, const Shader& shader, const mat4& Viewport, Dept
         [&](const TriangleSetup& t, Shader&, const Share& share, Counters& count) {
             triangle(t, first_number + t.face, zbuffer, faces, share, count);
         });
+}
+
+// Calls visit(model, number of its first face) for one model after the other.
+template <class Visit>
+void for_each_model(const std::vector<Model>& models, Visit&& visit) {
+    int first = 0;
+    for (const Model& model : models) visit(model, first), first += model.nfaces();
 }
 
 // Which of the numbers 0 to count-1 a pixel shows: the faces that are worth shading.
@@ -328,3 +359,36 @@ long draw_color(int begin, int end, const Shader& shader, const mat4& Viewport, 
             shade(t, first_number + t.face, own, faces, picture, share, count);
         }).shaded;
 }
+
+// ---- the exact shadow ----
+
+// Faces sorted into the cells of a grid on the light's screen, so that the few that may stand between a point and the light
+// are found at once. No resolution, no bias: whether one does is decided on the face itself.
+class LightGrid {
+public:
+    LightGrid() = default;
+    // The light's screen is cells x cells large and shows all faces.
+    LightGrid(const std::vector<Model>& models, const Camera& light, int cells);
+
+    // About one cell a face: measured, fewer make long lists and more take longer to fill than they save.
+    static int good_cells(int faces) { return std::clamp(static_cast<int>(std::sqrt(faces)), 1, 2048); }
+
+    // Whether any face but `number` lies between the light and the point p of that face, p on the light's screen.
+    bool shadows(const vec3& p, int number) const;
+
+    std::size_t entries() const { return entries_.size(); }
+    std::size_t bytes() const;
+
+private:
+    struct Entry {
+        float zmax;  // of the face, rounded up
+        std::int32_t face;
+    };
+    bool covers(int face, const vec3& p) const;
+
+    int cells_ = 0;
+    double zmax_ = 0;                   // the largest |z| of all corners
+    std::vector<vec3> corners_;         // three a face
+    std::vector<std::uint32_t> first_;  // entries of cell c: first_[c] to first_[c+1]
+    std::vector<Entry> entries_;        // in each cell the nearest to the light first
+};

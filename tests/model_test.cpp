@@ -1,7 +1,5 @@
 // model_test.cpp: what model.cpp promises about real .obj and .mtl files, polygons, normals, textures and fitting.
 // Every file it reads it writes first, into a fresh folder that it removes at the end.
-#include "check.h"
-#include "files.h"
 #include "model.h"
 
 #include <algorithm>
@@ -14,6 +12,9 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "check.h"
+#include "files.h"
 
 namespace fs = std::filesystem;
 
@@ -30,7 +31,8 @@ public:
         return *this / name;
     }
     // A picture of one colour: its first channel tells which file it came from.
-    void picture(const std::string& name, int first_channel, TGAImage::Format format = TGAImage::RGB, int side = 2) const {
+    void picture(const std::string& name, int first_channel, TGAImage::Format format = TGAImage::RGB,
+                 int side = 2) const {
         TGAImage image(side, side, format);
         TGAColor color;
         for (int i = 0; i < 4; i++) color[i] = static_cast<std::uint8_t>(first_channel + i);
@@ -227,24 +229,55 @@ TEST("a byte order mark and empty lines are skipped") {
     CHECK_EQ(load("\xEF\xBB\xBFv 5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").verts()[0].x, 5);
     CHECK_EQ(faces("\n\n\r\n \t\n" + square + "\n\n\nf 1 2 3\n\n"), "0 1 2");
     CHECK_THROWS(load("\xEF\xBB\xBF\n\nf 0 1 1"), "model.obj:3:");
+    CHECK_EQ(load("\xEF\xBB\xBFv " + std::string(1000000, ' ') + "5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").verts()[0].x, 5);
 }
 
 TEST("o, g, s, lines, curves and unknown words are passed over") {
     CHECK_EQ(faces("o head\ng a b c\ns 1\ns off\n" + square +
-                   "vp 1 2 3\nl 1 2\np 1\ncstype bezier\nverse 1 2\nfoo\nV 1 2 3\nF 1 2 3\nvt\xC3\xA9 x\n\x01\x02\nf 1 2 3\nend\n"),
+                   "vp 1 2 3\nl 1 2\np 1\ncstype bezier\nverse 1 2\nfoo\nV 1 2 3\nF 1 2 3\nvt\xC3\xA9 x\n\x01\x02\nf 1 "
+                   "2 3\nend\n"),
              "0 1 2");
 }
 
 // ---- numbers ----
 
 TEST("numbers are read as strtod reads them, to the last bit") {
-    std::vector<std::string> numbers = {"0", "-0", "+1", ".5", "-.5", "+.5", "5.", "1e3", "1E3", "1e+3", "1.5e-3", "-2.5E-10", "00012.50",
-                                        "999999999999999", "9999999999999999", "0.1", "123456789.123456", "1.23456789012345",
-                                        "0.000000000000001", "9007199254740993", "2.2250738585072014e-308", "5e-324", "1e-310",
-                                        "1.7976931348623157e308", "0.30000000000000004", "179769313486231570000000000000e279",
-                                        "100000000000000000000000000000000000000", "0.00000000000000000000000000000000001",
-                                        "1e-400", "-1e-400", "0e999", "0.0e-999", "1e-99999999999999999999", "1" + std::string(400, '0') + "e-400",
-                                        "0." + std::string(400, '0') + "1", "0." + std::string(400, '0') + "1e402"};
+    std::vector<std::string> numbers = {"0",
+                                        "-0",
+                                        "+1",
+                                        ".5",
+                                        "-.5",
+                                        "+.5",
+                                        "5.",
+                                        "1e3",
+                                        "1E3",
+                                        "1e+3",
+                                        "1.5e-3",
+                                        "-2.5E-10",
+                                        "00012.50",
+                                        "999999999999999",
+                                        "9999999999999999",
+                                        "0.1",
+                                        "123456789.123456",
+                                        "1.23456789012345",
+                                        "0.000000000000001",
+                                        "9007199254740993",
+                                        "2.2250738585072014e-308",
+                                        "5e-324",
+                                        "1e-310",
+                                        "1.7976931348623157e308",
+                                        "0.30000000000000004",
+                                        "179769313486231570000000000000e279",
+                                        "100000000000000000000000000000000000000",
+                                        "0.00000000000000000000000000000000001",
+                                        "1e-400",
+                                        "-1e-400",
+                                        "0e999",
+                                        "0.0e-999",
+                                        "1e-99999999999999999999",
+                                        "1" + std::string(400, '0') + "e-400",
+                                        "0." + std::string(400, '0') + "1",
+                                        "0." + std::string(400, '0') + "1e402"};
     std::mt19937 random(2);
     for (int i = 0; i < 20000; i++) {
         std::string s = random() % 3 == 0 ? "-" : "";
@@ -267,7 +300,8 @@ TEST("numbers are read as strtod reads them, to the last bit") {
 }
 
 TEST("a weight or colours after the coordinates are passed over") {
-    const Model m = load("v 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 1 1 0 .1 .2 .3 1\nvt 1\nvt .5 .25 0\nvn 0 0 2 1\nf 1/1/1 2/2/1 3/1/1\n");
+    const Model m =
+        load("v 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 1 1 0 .1 .2 .3 1\nvt 1\nvt .5 .25 0\nvn 0 0 2 1\nf 1/1/1 2/2/1 3/1/1\n");
     CHECK_EQ(text(m.verts()[1]), "1 0 0");
     CHECK(m.uv(0, 0) == (vec2{1, 0}));
     CHECK(m.uv(0, 1) == (vec2{.5, .25}));
@@ -275,8 +309,8 @@ TEST("a weight or colours after the coordinates are passed over") {
 }
 
 TEST("what is no finite number is an error with its line") {
-    for (const char* bad : {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309", "1e99999999999999999999", "nan(7)",
-                            "179769313486231570000000000000e280"}) {
+    for (const char* bad : {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309",
+                            "1e99999999999999999999", "nan(7)", "179769313486231570000000000000e280"}) {
         const std::string where = "model.obj:2: '" + std::string(bad) + "' is not finite";
         CHECK_THROWS(load("\nv 0 " + std::string(bad) + " 0\n"), where.c_str());
         CHECK_THROWS(load("\nvt " + std::string(bad) + " 0\n"), where.c_str());
@@ -320,10 +354,12 @@ TEST("an index of zero or out of range is an error with its line") {
     CHECK_THROWS(load(square + "f 1 2 5\n\nf 1 2 3\n"), "model.obj:5: vertex index 5, but the file has only 4");
     CHECK_THROWS(load(square + "f 1 2 3\nf 1/1 2 3\n"), "model.obj:6: texture index 1, but the file has only 0");
     CHECK_THROWS(load(square + extras + "f 1//4 2 3\n"), "model.obj:11: normal index 4, but the file has only 3");
-    CHECK_THROWS(load("f 1 2 3\n\nf 1 2 5\nf 9 9 9\n" + square), "model.obj:3: vertex index 5, but the file has only 4");
+    CHECK_THROWS(load("f 1 2 3\n\nf 1 2 5\nf 9 9 9\n" + square),
+                 "model.obj:3: vertex index 5, but the file has only 4");
     CHECK_THROWS(load(square + "f 1 2 -5\nv 0 0 0\n"), "model.obj:5: vertex index -5, but only 4 are defined so far");
     CHECK_THROWS(load(square + "f 1/-1 2 3\n"), "model.obj:5: texture index -1, but only 0 are defined so far");
-    for (const char* huge : {"2147483648", "4294967297", "99999999999999999999999999", "-2147483648", "18446744073709551617"})
+    for (const char* huge :
+         {"2147483648", "4294967297", "99999999999999999999999999", "-2147483648", "18446744073709551617"})
         CHECK_THROWS(load(square + "f 1 2 " + huge + "\n"), "model.obj:5: vertex index '");
     CHECK_THROWS(load(square + "f 1 2 2147483647\n"), "model.obj:5: vertex index 2147483647, but the file has only 4");
 }
@@ -367,7 +403,9 @@ namespace {
 
 using Polygon = std::vector<vec2>;
 
-double area2(const vec2& a, const vec2& b, const vec2& c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
+double area2(const vec2& a, const vec2& b, const vec2& c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
 double area2(const Polygon& p) {
     double sum = 0;
     for (std::size_t i = 1; i + 1 < p.size(); i++) sum += area2(p[0], p[i], p[i + 1]);
@@ -410,8 +448,8 @@ Cut cut(const Polygon& p, const Model& m) {
 // With whole numbers as coordinates every area is exact. Signed areas always add up to the polygon's; so where none is
 // reversed the triangles cover the polygon, and each of its points once.
 void check_cut(const Polygon& p, bool empty_allowed = false) {
-    const std::pair<vec3, vec3> planes[] = {{{1, 0, 0}, {0, 1, 0}}, {{0, 1, 0}, {0, 0, 1}}, {{0, 0, 1}, {1, 0, 0}}, {{2, 1, 0}, {-1, 3, 1}},
-                                            {{0, -1, 0}, {3, 0, 1}}, {{1, 0, 0}, {0, -1, 0}}};
+    const std::pair<vec3, vec3> planes[] = {{{1, 0, 0}, {0, 1, 0}},  {{0, 1, 0}, {0, 0, 1}},  {{0, 0, 1}, {1, 0, 0}},
+                                            {{2, 1, 0}, {-1, 3, 1}}, {{0, -1, 0}, {3, 0, 1}}, {{1, 0, 0}, {0, -1, 0}}};
     for (const auto& [right, up] : planes) {
         const Cut result = cut(p, load(in_plane(p, right, up)));
         CHECK_EQ(result.faces, static_cast<int>(p.size()) - 2);
@@ -451,13 +489,16 @@ bool is_simple(const Polygon& p) {
 // Random points in an order that crosses nowhere: crossings are undone, two edges at a time.
 Polygon random_polygon(std::mt19937& random, int n, int grid) {
     Polygon p;
-    for (int i = 0; i < n; i++) p.push_back({static_cast<double>(random() % static_cast<unsigned>(grid)), static_cast<double>(random() % static_cast<unsigned>(grid))});
+    for (int i = 0; i < n; i++)
+        p.push_back({static_cast<double>(random() % static_cast<unsigned>(grid)),
+                     static_cast<double>(random() % static_cast<unsigned>(grid))});
     for (int round = 0; round < 200; round++) {
         bool crossing = false;
         for (std::size_t i = 0; i + 2 < p.size(); i++)
             for (std::size_t j = i + 2; j < p.size(); j++)
                 if (!(i == 0 && j + 1 == p.size()) && touch(p[i], p[i + 1], p[j], p[(j + 1) % p.size()])) {
-                    std::reverse(p.begin() + static_cast<std::ptrdiff_t>(i) + 1, p.begin() + static_cast<std::ptrdiff_t>(j) + 1);
+                    std::reverse(p.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                                 p.begin() + static_cast<std::ptrdiff_t>(j) + 1);
                     crossing = true;
                 }
         if (!crossing) break;
@@ -469,14 +510,15 @@ Polygon random_polygon(std::mt19937& random, int n, int grid) {
 
 TEST("concave polygons are covered exactly once, in any plane, from any first corner") {
     const Polygon shapes[] = {
-        {{0, 0}, {4, 0}, {1, 1}, {0, 4}},                                                        // a dart
-        {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}},                                        // an L
-        {{0, 0}, {9, 0}, {9, 9}, {6, 9}, {6, 3}, {3, 3}, {3, 9}, {0, 9}},                        // a U
-        {{0, 0}, {2, 8}, {4, 1}, {6, 8}, {8, 1}, {10, 8}, {12, 0}, {12, -1}, {0, -1}},           // a comb
-        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}},  // a spiral
-        {{0, 3}, {2, 2}, {3, 0}, {4, 2}, {6, 3}, {4, 4}, {3, 6}, {2, 4}},                        // a star
-        {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},                        // a square, its sides halved
-        {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3}},                                                // a triangle with five corners
+        {{0, 0}, {4, 0}, {1, 1}, {0, 4}},                                                                      // a dart
+        {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}},                                                      // an L
+        {{0, 0}, {9, 0}, {9, 9}, {6, 9}, {6, 3}, {3, 3}, {3, 9}, {0, 9}},                                      // a U
+        {{0, 0}, {2, 8}, {4, 1}, {6, 8}, {8, 1}, {10, 8}, {12, 0}, {12, -1}, {0, -1}},                         // a comb
+        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}},  // a
+                                                                                                               // spiral
+        {{0, 3}, {2, 2}, {3, 0}, {4, 2}, {6, 3}, {4, 4}, {3, 6}, {2, 4}},                                      // a star
+        {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},  // a square, its sides halved
+        {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3}},                          // a triangle with five corners
     };
     for (Polygon p : shapes) {
         CHECK(is_simple(p));
@@ -508,10 +550,26 @@ TEST("random simple polygons are covered exactly once") {
 TEST("a hole that a bridge joins to the outline, spikes and repeated corners") {
     // The bridge from (0,0) to (3,3) is walked twice.
     check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}}, true);
-    check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {5, 5}, {5, 7}, {7, 7}, {7, 5}, {5, 5}, {2, 2}, {2, 1}, {1, 1}}, true);
-    check_cut({{0, 0}, {4, 0}, {4, 4}, {7, 9}, {4, 4}, {0, 4}}, true);                  // outward
-    check_cut({{0, 0}, {4, 0}, {4, 4}, {2, 1}, {4, 4}, {0, 4}}, true);                  // inward
-    check_cut({{0, 0}, {4, 0}, {8, 0}, {4, 0}, {4, 4}, {0, 4}}, true);                  // along an edge
+    check_cut({{0, 0},
+               {9, 0},
+               {9, 9},
+               {0, 9},
+               {0, 0},
+               {1, 1},
+               {1, 2},
+               {2, 2},
+               {5, 5},
+               {5, 7},
+               {7, 7},
+               {7, 5},
+               {5, 5},
+               {2, 2},
+               {2, 1},
+               {1, 1}},
+              true);
+    check_cut({{0, 0}, {4, 0}, {4, 4}, {7, 9}, {4, 4}, {0, 4}}, true);  // outward
+    check_cut({{0, 0}, {4, 0}, {4, 4}, {2, 1}, {4, 4}, {0, 4}}, true);  // inward
+    check_cut({{0, 0}, {4, 0}, {8, 0}, {4, 0}, {4, 4}, {0, 4}}, true);  // along an edge
     check_cut({{0, 0}, {0, 0}, {4, 0}, {4, 4}, {4, 4}, {4, 4}, {1, 1}, {0, 4}}, true);
 }
 
@@ -553,8 +611,9 @@ TEST("a square with a cut along a random tree, walked around on both sides") {
 }
 
 TEST("polygons without area, or that cross themselves, have two triangles fewer than corners") {
-    for (const Polygon& p : {Polygon{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {1, 1}}, Polygon(7, vec2{1, 1}), Polygon{{0, 0}, {2, 2}, {2, 0}, {0, 2}},
-                             Polygon{{0, 0}, {2, 0}, {0, 0}, {2, 0}}, Polygon{{0, 3}, {2, -3}, {-3, 1}, {3, 1}, {-2, -3}}}) {
+    for (const Polygon& p : {Polygon{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {1, 1}}, Polygon(7, vec2{1, 1}),
+                             Polygon{{0, 0}, {2, 2}, {2, 0}, {0, 2}}, Polygon{{0, 0}, {2, 0}, {0, 0}, {2, 0}},
+                             Polygon{{0, 3}, {2, -3}, {-3, 1}, {3, 1}, {-2, -3}}}) {
         const Model m = load(in_plane(p));
         check_invariants(m);
         CHECK_EQ(m.nfaces(), static_cast<int>(p.size()) - 2);
@@ -562,7 +621,8 @@ TEST("polygons without area, or that cross themselves, have two triangles fewer 
     std::mt19937 random(4);
     for (int i = 0; i < 500; i++) {
         Polygon p;
-        for (auto n = 4 + random() % 30; n-- > 0;) p.push_back({static_cast<double>(random() % 6), static_cast<double>(random() % 6)});
+        for (auto n = 4 + random() % 30; n-- > 0;)
+            p.push_back({static_cast<double>(random() % 6), static_cast<double>(random() % 6)});
         const Model m = load(in_plane(p));
         CHECK_EQ(m.nfaces(), static_cast<int>(p.size()) - 2);
         CHECK_EQ(cut(p, m).area2, area2(p));
@@ -573,12 +633,14 @@ TEST("polygons without area, or that cross themselves, have two triangles fewer 
 }
 
 TEST("a polygon is cut alike at every scale, to the ends of the double's range") {
-    const Polygon p = {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}};
+    const Polygon p = {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4},
+                       {6, 6}, {4, 6},  {4, 8},   {8, 8},  {8, 2}, {0, 2}};
     Polygon centred = p;  // so that differences overflow where coordinates do not
     for (vec2& q : centred) q = q - vec2{5, 5};
     for (const Polygon& shape : {p, centred}) {
         const std::string expected = faces(in_plane(shape, {2, 1, 0}, {-1, 3, 1}));
-        for (const double scale : {1e-30, 1e38, 1e300, std::ldexp(1., 1017), std::ldexp(1., -1074), std::ldexp(1., -1040)})
+        for (const double scale :
+             {1e-30, 1e38, 1e300, std::ldexp(1., 1017), std::ldexp(1., -1074), std::ldexp(1., -1040)})
             CHECK_EQ(faces(in_plane(shape, {2, 1, 0}, {-1, 3, 1}, scale)), expected);
     }
 }
@@ -597,7 +659,8 @@ TEST("polygons of 100 000 corners") {
             spiral.push_back({r * std::cos(angle), r * std::sin(angle)});
         }
     std::mt19937 random(5);
-    for (int i = 0; i < n; i++) noise.push_back({static_cast<double>(random() % 1000), static_cast<double>(random() % 1000)});
+    for (int i = 0; i < n; i++)
+        noise.push_back({static_cast<double>(random() % 1000), static_cast<double>(random() % 1000)});
 
     const Cut of_comb = cut(comb, load(in_plane(comb)));
     CHECK_EQ(of_comb.faces, n + 1);
@@ -616,7 +679,8 @@ namespace {
 std::string cube(const char* scale_exponent = "") {
     std::string obj;
     for (int i = 0; i < 8; i++)
-        for (int k = 0; k < 3; k++) obj += (k ? " " : "v ") + std::string(i >> k & 1 ? "1" : "-1") + scale_exponent + (k == 2 ? "\n" : "");
+        for (int k = 0; k < 3; k++)
+            obj += (k ? " " : "v ") + std::string(i >> k & 1 ? "1" : "-1") + scale_exponent + (k == 2 ? "\n" : "");
     return obj;
 }
 const std::string cube_quads = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
@@ -631,8 +695,9 @@ constexpr double few_roundings = 16 * std::numeric_limits<double>::epsilon();
 }  // namespace
 
 TEST("normals are weighted by angle, so it does not matter how a cube's sides are cut") {
-    for (const std::string& sides : {cube_quads, std::string("f 1 3 4\nf 1 4 2\nf 6 8 7\nf 6 7 5\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\n"
-                                                             "f 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n")}) {
+    for (const std::string& sides :
+         {cube_quads, std::string("f 1 3 4\nf 1 4 2\nf 6 8 7\nf 6 7 5\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\n"
+                                  "f 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n")}) {
         const Model m = load(cube() + sides);
         check_invariants(m);
         CHECK_EQ(m.nfaces(), 12);
@@ -661,7 +726,8 @@ TEST("made normals do not depend on the scale") {
 TEST("faces without area contribute nothing") {
     const std::string obj = "v 0 0 0\nv 3 0 0\nv 0 3 1\nv .1 .1 .1\nv .3 .3 .3\nv 9 9 9\nf 1 2 3\n";
     const std::string expected = normals(load(obj), 0);
-    CHECK_EQ(normals(load(obj + "f 1 1 2\nf 2 2 2\nf 1 4 5\nf 3 1 3\n"), 0), expected);  // .1, .2, .3 are not on a line in binary
+    CHECK_EQ(normals(load(obj + "f 1 1 2\nf 2 2 2\nf 1 4 5\nf 3 1 3\n"), 0),
+             expected);  // .1, .2, .3 are not on a line in binary
     const Model m = load(obj + "f 4 5 6\nf 1 1 6\n");
     check_invariants(m);
     CHECK_EQ(normals(m, 0), expected);
@@ -681,7 +747,8 @@ TEST("where faces cancel, each keeps its own normal") {
     // A sheet of many triangles and its other side.
     std::string obj;
     std::mt19937 random(6);
-    for (int i = 0; i < 40; i++) obj += "v " + std::to_string(random() % 1000) + "e-3 " + std::to_string(random() % 1000) + "e-3 .123\n";
+    for (int i = 0; i < 40; i++)
+        obj += "v " + std::to_string(random() % 1000) + "e-3 " + std::to_string(random() % 1000) + "e-3 .123\n";
     for (int i = 1; i + 1 < 40; i++)
         for (const char* order : {"ab", "ba"}) {
             const std::string a = std::to_string(i), b = std::to_string(i + 1);
@@ -694,7 +761,8 @@ TEST("where faces cancel, each keeps its own normal") {
 }
 
 TEST("given normals are normalised; one without length is made") {
-    const Model m = load(square + "vn 0 0 5\nvn 3e300 0 4e300\nvn 0 1e-310 0\nvn 0 0 0\nf 1//1 2//2 3//3\nf 1//4 3//-1 4\n");
+    const Model m =
+        load(square + "vn 0 0 5\nvn 3e300 0 4e300\nvn 0 1e-310 0\nvn 0 0 0\nf 1//1 2//2 3//3\nf 1//4 3//-1 4\n");
     check_invariants(m);
     CHECK_EQ(text(m.normal(0, 0)), "0 0 1");
     check_near(m.normal(0, 1), {.6, 0, .8}, few_roundings);
@@ -707,7 +775,10 @@ TEST("given normals are normalised; one without length is made") {
 TEST("faces are grouped by material, in the order of their first faces") {
     const Folder folder;
     folder.write("m.mtl", "newmtl red\nKd 1 0 0\nnewmtl unused\nnewmtl blue\nKd 0 0 1\n");
-    const Model m(folder.write("m.obj", square + "mtllib m.mtl\nusemtl blue\nf 1 2 3\nusemtl red\nf 2 3 4\nusemtl blue\nf 3 4 1\nf 4 1 2\nusemtl red\n"));
+    const Model m(folder.write(
+        "m.obj",
+        square +
+            "mtllib m.mtl\nusemtl blue\nf 1 2 3\nusemtl red\nf 2 3 4\nusemtl blue\nf 3 4 1\nf 4 1 2\nusemtl red\n"));
     check_invariants(m);
     CHECK_EQ(faces(m), "0 1 2, 2 3 0, 3 0 1, 1 2 3");
     CHECK_EQ(m.materials().size(), 2u);
@@ -721,7 +792,8 @@ TEST("faces are grouped by material, in the order of their first faces") {
 TEST("an unknown material is the default one, with a note") {
     const Folder folder;
     folder.write("m.mtl", "newmtl red\nKd .5\n");
-    const Model m(folder.write("m.obj", square + "f 1 2 3\nusemtl green\nf 2 3 4\nusemtl red\nf 3 4 1\nusemtl pink\nf 4 1 2\nusemtl green\nf 1 2 4\nmtllib m.mtl\n"));
+    const Model m(folder.write("m.obj", square + "f 1 2 3\nusemtl green\nf 2 3 4\nusemtl red\nf 3 4 1\nusemtl pink\nf "
+                                                 "4 1 2\nusemtl green\nf 1 2 4\nmtllib m.mtl\n"));
     check_invariants(m);
     CHECK_EQ(faces(m), "0 1 2, 1 2 3, 3 0 1, 0 1 3, 2 3 0");
     CHECK_EQ(m.materials().size(), 2u);
@@ -732,7 +804,8 @@ TEST("an unknown material is the default one, with a note") {
 
 TEST("a missing .mtl is a note, a bad one an error") {
     const Folder folder;
-    CHECK_EQ(notes(Model(folder.write("m.obj", "mtllib none.mtl\n" + square + "f 1 2 3\n"))), "there is no material file 'none.mtl'\n");
+    CHECK_EQ(notes(Model(folder.write("m.obj", "mtllib none.mtl\n" + square + "f 1 2 3\n"))),
+             "there is no material file 'none.mtl'\n");
     const std::string obj = "mtllib m.mtl\n" + square + "f 1 2 3\n";
     folder.write("m.obj", obj);
     for (const char* bad : {"Kd 1 x 0", "Kd nan", "Kd 1 2", "Kd", "Kd 1e999 0 0", "Kd 1 1 1y", "Kd spectre"}) {
@@ -741,7 +814,9 @@ TEST("a missing .mtl is a note, a bad one an error") {
     }
     folder.write("m.mtl", std::string("newmtl a\0", 9));
     CHECK_THROWS(Model(folder / "m.obj"), "m.mtl: is a binary file, not text");
-    folder.write("m.mtl", "\xEF\xBB\xBF" "Kd 1 1 1\nnewmtl a\nKd xyz 1 1 1\nNs 10\nillum 2");
+    folder.write("m.mtl",
+                 "\xEF\xBB\xBF"
+                 "Kd 1 1 1\nnewmtl a\nKd xyz 1 1 1\nNs 10\nillum 2");
     CHECK_EQ(notes(Model(folder / "m.obj")), "m.mtl:3: Kd xyz is not known, white is used\n");
 }
 
@@ -750,7 +825,8 @@ TEST("an mtllib line is one name with blanks, or several names") {
     fs::create_directory(folder / "sub");
     folder.write("my own.mtl", "newmtl my own # colour\nKd .25\n");
     folder.write("sub/b.mtl", "newmtl b\nKd 2 -1 .5\n");
-    const Model m(folder.write("m.obj", square + "mtllib  my own.mtl \r\nmtllib sub\\b.mtl c.mtl\nusemtl my own # colour \nf 1 2 3\nusemtl b\nf 1 2 3\n"));
+    const Model m(folder.write("m.obj", square + "mtllib \\\n my own.mtl \\\r\n \\\n\r\nmtllib sub\\b.mtl "
+                                                 "c.mtl\nusemtl my own # colour \nf 1 2 3\nusemtl b\nf 1 2 3\n"));
     CHECK_EQ(m.materials().size(), 2u);
     CHECK_EQ(text(m.materials()[0].Kd), "0.25 0.25 0.25");
     CHECK_EQ(text(m.materials()[1].Kd), "1 0 0.5");  // a reflectance is in [0,1]
@@ -759,7 +835,8 @@ TEST("an mtllib line is one name with blanks, or several names") {
 
 TEST("notes are limited in number and length, and fit on a line each") {
     std::string obj = square;
-    for (int i = 0; i < 100; i++) obj += "usemtl " + std::string(1000, 'x') + "\x1B\n" + "usemtl \x1B" + std::to_string(i) + "\nf 1 2 3\n";
+    for (int i = 0; i < 100; i++)
+        obj += "usemtl " + std::string(1000, 'x') + "\x1B\n" + "usemtl \x1B" + std::to_string(i) + "\nf 1 2 3\n";
     const Model m = load(obj);
     CHECK_EQ(m.notes().size(), 21u);
     CHECK_EQ(m.notes()[0], "there is no material '?0'");
@@ -782,8 +859,8 @@ void all_suffixes(const Folder& folder) {
     folder.picture("m_glow.tga", 50);
 }
 std::string maps(const Material& m) {  // the first channels, -1 where there is no map
-    return shown(first(m.diffuse)) + " " + shown(first(m.normal)) + " " + shown(first(m.tangent)) + " " + shown(first(m.specular)) + " " +
-           shown(first(m.glow));
+    return shown(first(m.diffuse)) + " " + shown(first(m.normal)) + " " + shown(first(m.tangent)) + " " +
+           shown(first(m.specular)) + " " + shown(first(m.glow));
 }
 std::string maps(const Model& m) {
     std::string out;
@@ -836,7 +913,8 @@ TEST("faces without texture coordinates have no textures, and none is decoded") 
     CHECK_EQ(notes(m), "no texture coordinates, so no textures\n");
     folder.picture("m_diffuse.tga", 10);
     folder.write("m.mtl", "newmtl a\nnewmtl b\nmap_Kd m_diffuse.tga\n");
-    const Model two(folder.write("m.obj", "mtllib m.mtl\n" + square + extras + "usemtl a\nf 1 2 3/1\nusemtl b\nf 1 2 3\n"));
+    const Model two(
+        folder.write("m.obj", "mtllib m.mtl\n" + square + extras + "usemtl a\nf 1 2 3/1\nusemtl b\nf 1 2 3\n"));
     CHECK_EQ(maps(two), "10 -1 -1 -1 -1, -1 -1 -1 -1 -1");
     CHECK_EQ(notes(two), "material 'b': no texture coordinates, so no textures\n");
 }
@@ -846,31 +924,41 @@ TEST("the maps of an .mtl, relative to it, before those by suffix") {
     fs::create_directory(folder / "lib");
     fs::create_directory(folder / "lib/my maps");
     for (const char* name : {"lib/my maps/a b.tga", "lib/s.TGA", "lib/n.tga", "lib/e.tga", "lib/bump.tga"})
-        folder.picture(name, name[4] == 'm' ? 100 : name[4] == 's' ? 110 : name[4] == 'n' ? 120 : name[4] == 'e' ? 130 : 140);
+        folder.picture(name, name[4] == 'm'   ? 100
+                             : name[4] == 's' ? 110
+                             : name[4] == 'n' ? 120
+                             : name[4] == 'e' ? 130
+                                              : 140);
     folder.write("lib/m.mtl",
                  "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ks s.TGA\nnorm -bm 0.5 n.tga\n"
                  "map_Bump -bm 1 bump.tga\nmap_Ke -mm 0 1 -blendu off -type sphere -imfchan l e.tga \r\n"
                  "newmtl part\n  map_Kd\tmy maps/a b.tga\nnewmtl none\nKa 0 0 0\nnewmtl bumpy\nbump bump.tga\n");
     const std::string obj = "mtllib lib/m.mtl\n" + square + extras;
     std::string each;
-    for (const char* name : {"full", "part", "none", "bumpy"}) each += "usemtl " + std::string(name) + "\nf 1/1 2/2 3/3\n";
+    for (const char* name : {"full", "part", "none", "bumpy"})
+        each += "usemtl " + std::string(name) + "\nf 1/1 2/2 3/3\n";
     folder.write("m.obj", obj + each);
     Model m(folder / "m.obj");
     CHECK_EQ(maps(m), "100 -1 120 110 130, 100 -1 -1 -1 -1, -1 -1 -1 -1 -1, -1 -1 140 -1 -1");
     CHECK_EQ(notes(m), "");
     all_suffixes(folder);
-    CHECK_EQ(maps(Model(folder / "m.obj", NormalMap::tangent)), "100 -1 120 110 130, 100 -1 30 40 50, 10 -1 30 40 50, 10 -1 140 40 50");
-    CHECK_EQ(maps(Model(folder / "m.obj", NormalMap::object)), "100 20 -1 110 130, 100 20 -1 40 50, 10 20 -1 40 50, 10 20 -1 40 50");
+    CHECK_EQ(maps(Model(folder / "m.obj", NormalMap::tangent)),
+             "100 -1 120 110 130, 100 -1 30 40 50, 10 -1 30 40 50, 10 -1 140 40 50");
+    CHECK_EQ(maps(Model(folder / "m.obj", NormalMap::object)),
+             "100 20 -1 110 130, 100 20 -1 40 50, 10 20 -1 40 50, 10 20 -1 40 50");
 }
 
 TEST("a map that is no .tga, or is missing, is a note; one that is corrupt is an error") {
     const Folder folder;
-    folder.write("m.mtl", "newmtl a\n\nmap_Kd texture.png\nmap_Ks gone.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke -bm x y.jpg\n");
+    folder.write(
+        "m.mtl",
+        "newmtl a\n\nmap_Kd texture.png\nmap_Ks gone.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke -bm x y.jpg\n");
     folder.write("m.obj", "mtllib m.mtl\n" + textured + "usemtl a\nf 1/1 2/2 3/3\nusemtl unused\n");
     folder.write("bad.tga", "no picture");
     const Model m(folder / "m.obj");
     CHECK_EQ(maps(m), "-1 -1 -1 -1 -1, -1 -1 -1 -1 -1");
-    CHECK_EQ(notes(m), "m.mtl:3: texture.png is not a TGA file, left out\nm.mtl:4: gone.tga does not exist, left out\n");
+    CHECK_EQ(notes(m),
+             "m.mtl:3: texture.png is not a TGA file, left out\nm.mtl:4: gone.tga does not exist, left out\n");
     folder.picture("m_diffuse.tga", 10);
     CHECK_EQ(maps(Model(folder / "m.obj")), "10 -1 -1 -1 -1, 10 -1 -1 -1 -1");  // instead
     folder.write("m.obj", "mtllib m.mtl\nusemtl unused\n" + textured);
@@ -893,7 +981,8 @@ TEST("errors come in a fixed order: the .obj, the .mtl, then the textures") {
 
 TEST("grey pictures are widened where three channels are read, and are no normal maps") {
     const Folder folder;
-    for (const char* name : {"m_diffuse.tga", "m_nm.tga", "m_glow.tga", "m_spec.tga"}) folder.picture(name, 77, TGAImage::GRAYSCALE);
+    for (const char* name : {"m_diffuse.tga", "m_nm.tga", "m_glow.tga", "m_spec.tga"})
+        folder.picture(name, 77, TGAImage::GRAYSCALE);
     const Model m(folder.write("m.obj", textured));
     check_invariants(m);
     CHECK_EQ(maps(m), "77 -1 -1 77 77");
@@ -912,7 +1001,8 @@ TEST("shared pictures are decoded once, and their copies are bounded") {
     }
     folder.write("m.mtl", mtl);
     folder.write("m.obj", "mtllib m.mtl\n" + square + extras + uses);
-    CHECK_THROWS(Model(folder / "m.obj"), "m.obj: its materials share pictures that would take more than 1 GiB in copies");
+    CHECK_THROWS(Model(folder / "m.obj"),
+                 "m.obj: its materials share pictures that would take more than 1 GiB in copies");
     folder.picture("m_diffuse.tga", 5);
     const Model m(folder / "m.obj");
     CHECK_EQ(m.materials().size(), 40u);
@@ -966,10 +1056,11 @@ TEST("fit gives the same bits for a model scaled by any power of two") {
     std::mt19937 random(8);
     std::uniform_real_distribution<double> in(-1, 1);
     std::vector<vec3> verts;
-    for (int i = 0; i < 300; i++) verts.push_back({1.5 + in(random), 3 * in(random) + 5e-9, in(random) * 1e-5});
+    for (int i = 0; i < 300; i++) verts.push_back({1.5 + in(random), 3 * in(random) + 5e-9, in(random)*1e-5});
     verts[7].y = 1e-290;
     std::string faces_text;
-    for (int i = 1; i < 298; i++) faces_text += "f " + std::to_string(i) + " " + std::to_string(i + 1) + " " + std::to_string(i + 2) + "\n";
+    for (int i = 1; i < 298; i++)
+        faces_text += "f " + std::to_string(i) + " " + std::to_string(i + 1) + " " + std::to_string(i + 2) + "\n";
     Model unscaled = load(points(verts) + faces_text);
     CHECK(unscaled.fit());
     double largest = 0;
@@ -997,7 +1088,8 @@ TEST("fit at the ends of the arithmetic") {
     Model far_point = load("v 5 6e307 7\nf 1 1 1\n");
     CHECK(far_point.fit());
     CHECK_EQ(text(far_point.verts()[0]), "0 0 0");
-    Model far_speck = load("v 1e10 1e10 1e10\nv 10000000000.000002 1e10 1e10\nv 1e10 10000000000.000002 1e10\nv -1e308 0 0\nf 1 2 3\n");
+    Model far_speck = load(
+        "v 1e10 1e10 1e10\nv 10000000000.000002 1e10 1e10\nv 1e10 10000000000.000002 1e10\nv -1e308 0 0\nf 1 2 3\n");
     CHECK(far_speck.fit());
     check_invariants(far_speck);
     CHECK_EQ(text(far_speck.verts()[1]), "1 -1 0");
@@ -1022,17 +1114,51 @@ bool survives(const fs::path& obj) {
 }
 
 std::string mutated(std::string s, std::mt19937& random) {
-    static const char* const tokens[] = {"v ",  "vt ", "vn ", "f ",   "/",       "//",  "-1",    "0",       "1e999",    "nan", "\\\n", "\r\n",     "#",       "usemtl a\n",
-                                         "999", "-",   ".",   "e308", "1e-320 ", "\t",  "mtllib m.mtl\n", "newmtl b\n", "map_Kd ", "Kd ", "1 2 3 4 5 6 7 8"};
+    static const char* const tokens[] = {"v ",
+                                         "vt ",
+                                         "vn ",
+                                         "f ",
+                                         "/",
+                                         "//",
+                                         "-1",
+                                         "0",
+                                         "1e999",
+                                         "nan",
+                                         "\\\n",
+                                         "\r\n",
+                                         "#",
+                                         "usemtl a\n",
+                                         "999",
+                                         "-",
+                                         ".",
+                                         "e308",
+                                         "1e-320 ",
+                                         "\t",
+                                         "mtllib m.mtl\n",
+                                         "newmtl b\n",
+                                         "map_Kd ",
+                                         "Kd ",
+                                         "1 2 3 4 5 6 7 8"};
     for (auto n = 1 + random() % 4; n-- > 0;) {
         const std::size_t at = s.empty() ? 0 : random() % s.size(), length = random() % 12;
         switch (random() % 6) {
-            case 0: s.insert(at, tokens[random() % std::size(tokens)]); break;
-            case 1: s.erase(at, length); break;
-            case 2: s.insert(at, s.substr(s.empty() ? 0 : random() % s.size(), length * 4)); break;
-            case 3: if (!s.empty()) s[at] = static_cast<char>(random()); break;
-            case 4: if (!s.empty()) s[at] = static_cast<char>('0' + random() % 10); break;
-            default: if (random() % 8 == 0) s.resize(at);
+            case 0:
+                s.insert(at, tokens[random() % std::size(tokens)]);
+                break;
+            case 1:
+                s.erase(at, length);
+                break;
+            case 2:
+                s.insert(at, s.substr(s.empty() ? 0 : random() % s.size(), length * 4));
+                break;
+            case 3:
+                if (!s.empty()) s[at] = static_cast<char>(random());
+                break;
+            case 4:
+                if (!s.empty()) s[at] = static_cast<char>('0' + random() % 10);
+                break;
+            default:
+                if (random() % 8 == 0) s.resize(at);
         }
     }
     return s;
@@ -1044,8 +1170,11 @@ TEST("mutated files give a model or an error, never a crash") {
     const Folder folder;
     all_suffixes(folder);
     folder.picture("a b.tga", 9);
-    const std::string mtl = "newmtl a\nKd .5 .5 .5\nmap_Kd -s 1 1 1 a b.tga\nmap_Bump m_nm.tga\nnewmtl b\nmap_Ks m_spec.tga\nKd 1\n";
-    const std::string obj = "# head\nmtllib m.mtl\n" + cube() + extras + "usemtl a\nf 1/1/1 3/2/2 4/3/3 2/1\ng x\nusemtl b\nf -8//1 -7 -6 -5 6\nf 1 2 \\\n 6 5\nf 3 7 8\nusemtl a\nf 1 5 7\n";
+    const std::string mtl =
+        "newmtl a\nKd .5 .5 .5\nmap_Kd -s 1 1 1 a b.tga\nmap_Bump m_nm.tga\nnewmtl b\nmap_Ks m_spec.tga\nKd 1\n";
+    const std::string obj = "# head\nmtllib m.mtl\n" + cube() + extras +
+                            "usemtl a\nf 1/1/1 3/2/2 4/3/3 2/1\ng x\nusemtl b\nf -8//1 -7 -6 -5 6\nf 1 2 \\\n 6 5\nf 3 "
+                            "7 8\nusemtl a\nf 1 5 7\n";
     folder.write("m.mtl", mtl);
     folder.write("m.obj", obj);
     CHECK(survives(folder / "m.obj"));
@@ -1083,7 +1212,8 @@ TEST("random bytes give a model or an error, never a crash") {
         for (int k = 0; k < 12; k++)
             for (int c = 0; c < 3; c++) {
                 const char* const exponents[] = {"", "", "e-320", "e307", "e-160", "e-8"};
-                obj += (c ? " " : "v ") + std::to_string(static_cast<int>(random() % 7) - 3) + exponents[random() % std::size(exponents)] + (c == 2 ? "\n" : "");
+                obj += (c ? " " : "v ") + std::to_string(static_cast<int>(random() % 7) - 3) +
+                       exponents[random() % std::size(exponents)] + (c == 2 ? "\n" : "");
             }
         for (int k = 0; k < 8; k++) {
             obj += "f";

@@ -1,5 +1,5 @@
-// watertight_test.cpp: every sample of a tessellated surface is drawn exactly once, whatever happens to the surface on its
-// way to the screen; and coverage agrees with a reference that tests every pixel by itself.
+// watertight_test.cpp: every sample of a tessellated surface is drawn exactly once, whatever happens to the surface on
+// its way to the screen; and coverage agrees with a reference that tests every pixel by itself.
 #include "check.h"
 #include "our_gl.h"
 
@@ -44,8 +44,8 @@ Hits tessellated(const mat4& M, const mat4& Viewport, int cells, Random& r) {
     return hits;
 }
 
-// Where the pixel centre lies in the square, from the inverse transform: 1 inside, 0 outside, -1 within 1/4096 pixel of its
-// outline (snapping moves an outline by up to 1/65536 pixel and a half).
+// Where the pixel centre lies in the square, from the inverse transform: 1 inside, 0 outside, -1 within 1/4096 pixel of
+// its outline (snapping moves an outline by up to 1/65536 pixel and a half).
 int expected(const mat4& M, const mat4& Viewport, int cells, int x, int y) {
     const mat4 s = Viewport * M;
     const mat3 h{{{s[0].x, s[0].y, s[0].w}, {s[1].x, s[1].y, s[1].w}, {s[3].x, s[3].y, s[3].w}}};

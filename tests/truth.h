@@ -1,0 +1,151 @@
+// truth.h: what a picture should show, found by casting rays: the measure that every shadow method is held against.
+// It is slow, exact and shares nothing with the renderer but the vectors and the loader; it does not shade.
+//
+// Every decision (does the ray meet the triangle, which of two is nearer, is the occluder in front of the surface) is
+// the sign of a polynomial in the given doubles, and each sign is the exact one: computed in double where the rounding
+// error is provably too small to matter, else without rounding. So there is no epsilon: no gap along a shared edge, no
+// surface that shadows itself at grazing light, no light through a crease. That holds as long as nothing over- or
+// underflows: for coordinates that are 0 or from 1e-30 to 1e40 in magnitude.
+#pragma once
+#include "geometry.h"
+#include "model.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+using Triangle = std::array<vec3, 3>;  // counter-clockwise where its front is seen
+
+// The lesson's camera. With z = (eye-center)/|eye-center|, x = up cross z, y = z cross x (all of unit length) the point
+// center + X*x + Y*y is seen at (X,Y), and the square [-1,1]^2 covers the middle three quarters of the shorter side.
+// Where up is zero or parallel to the view, the axis least parallel to the view takes its place.
+struct View {
+    vec3 eye{1, 1, 4}, center{}, up{0, 1, 0};
+    int width = 800, height = 800;
+
+    // From the eye through the centre of the pixel (px,py), (0,0) at the bottom left; its length takes it to the plane
+    // through `center`. Throws std::invalid_argument where eye = center.
+    vec3 direction(int px, int py) const;
+};
+
+struct Hit {
+    int triangle;  // counted over the faces of all models, in their order
+    double t;      // hit = origin + t * direction, t > 0
+    vec3 point;
+    vec3 weight;  // barycentric coordinates of the hit, none negative, their sum 1 up to rounding
+};
+
+class RayCaster {
+public:
+    // Copies the triangles and sorts them into a bounding volume hierarchy.
+    // Throws std::invalid_argument for a coordinate that is not finite or beyond 1e40.
+    explicit RayCaster(std::span<const Model> models);
+    explicit RayCaster(std::vector<Triangle> triangles);
+
+    int ntriangles() const { return static_cast<int>(triangles_.size()); }
+    const Triangle& triangle(int number) const {
+        return triangles_[static_cast<std::size_t>(position_[static_cast<std::size_t>(number)])];
+    }
+
+    // The nearest triangle in front of the origin, seen from either side; its edges and corners belong to it, and one
+    // that is seen edge-on is not there. Of several at exactly the same distance the one whose front is seen, then the
+    // one with the smaller number.
+    std::optional<Hit> first_hit(const vec3& origin, const vec3& direction) const;
+
+    // Whether anything but the triangle itself lies in front (0 < t) of its point (w0*v0 + w1*v1 + w2*v2)/(w0+w1+w2)
+    // in the direction. The weights need a positive sum; the point may lie outside the triangle, in its plane.
+    bool occluded(int triangle, const vec3& weight, const vec3& direction) const;
+
+    // Whether anything lies in front of a free point with beyond < t: what a comparison of depths with a bias decides.
+    // Only here is t a rounded number.
+    bool occluded(const vec3& origin, const vec3& direction, double beyond) const;
+
+    // Whether the front of the triangle faces the direction: normal . direction > 0.
+    bool faces(int triangle, const vec3& direction) const;
+
+private:
+    struct Node {  // a leaf holds triangles_[first, first+count); an inner node, count 0, the nodes first and first+1
+        vec3 low, high;
+        int first, count;
+    };
+    struct Ray;
+    struct Meeting;
+    struct Builder;
+
+    template <typename Visit>
+    void traverse(const Ray& ray, Visit visit) const;
+
+    std::vector<Triangle> triangles_;  // in the order of the leaves
+    std::vector<int> number_;          // of the triangle at a position
+    std::vector<int> position_;        // of the triangle with a number
+    std::vector<Node> nodes_;          // the root first; empty without triangles
+};
+
+enum class Truth : std::uint8_t {
+    background,  // no surface
+    away,        // the front of the visible triangle does not face the light
+    shadowed,    // it does, and something stands between
+    lit
+};
+
+struct TruthImage {
+    int width = 0, height = 0;
+    std::vector<Truth> pixel;   // row 0 at the bottom
+    std::vector<int> triangle;  // the visible one, -1 for none
+};
+
+// What is visible at each pixel's centre, and whether that point of the surface sees the light. `to_light` points from
+// the scene to the light and need not be a unit vector. The result does not depend on the number of threads.
+TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light, int threads = 1);
+
+// ---- how far a shadow method is from the truth ----
+
+struct ShadowError {
+    long facing = 0;        // pixels whose surface faces the light: the whole that the percentages are of
+    long falsely_dark = 0;  // of those lit in truth: acne, and half of what a ragged boundary costs
+    long falsely_lit = 0;   // of those shadowed in truth: leaks, and the other half
+
+    double percent() const { return percent_of(falsely_dark + falsely_lit); }
+    double percent_dark() const { return percent_of(falsely_dark); }
+    double percent_lit() const { return percent_of(falsely_lit); }
+
+private:
+    double percent_of(long wrong) const {
+        return facing ? 100. * static_cast<double>(wrong) / static_cast<double>(facing) : 0;
+    }
+};
+
+// Compares a method's verdicts, one for each pixel, row 0 at the bottom, 0 dark and anything else lit. Only those of
+// the facing pixels are looked at. Throws std::invalid_argument where the sizes differ.
+ShadowError compare(const TruthImage& truth, std::span<const std::uint8_t> lit);
+
+// What a shadow buffer with square texels of side h, read at the nearest texel, adds to the errors of its bias:
+//     share of wrong pixels = nearest_texel_error * h * L/A,
+// L the length of the shadow's boundary and A the area that faces the light, both as the light sees them.
+// A point is judged by its texel's centre, wrongly where the boundary passes between the two. Shift a straight boundary
+// with unit normal n through all positions: the wrong area for each h of length is then h^2 times the integral of
+// |x . n| over the unit square around 0. The mean of |x . n| over all n is 2/pi |x|, and the mean of |x| over the
+// square is (sqrt(2) + ln(1 + sqrt(2)))/6.
+inline constexpr double nearest_texel_error = 0.2435693614160477;  // (sqrt(2) + ln(1 + sqrt(2))) / (3 pi)
+
+// What becomes of a shadow buffer with a constant bias, as a function of its texel's size.
+struct Prediction {
+    double leak = 0;               // share of the facing pixels that the bias makes wrong at any resolution
+    double boundary_per_area = 0;  // L/A, in one over the scene's unit of length
+    double deviation = 0;          // the standard deviation of L/A as it was estimated, if crossings were independent
+
+    // Share of the facing pixels that are wrong with texels of side h, in the scene's unit of length.
+    double wrong(double h) const { return leak + nearest_texel_error * h * boundary_per_area; }
+};
+
+// The leak is counted; L/A follows from Crofton's formula: a needle of length r thrown at random crosses the boundary
+// with the probability 2 r L/(pi A). From the surface point of each facing pixel go `needles` needles across the light,
+// `length` long (in the scene's unit), their directions spread by a fixed seed. One crosses the boundary where its two
+// ends differ in whether something lies more than `bias` towards the light. Where the bias makes the pixel wrong anyway
+// a crossing puts it right, so it counts -1: the part of the boundary that the bias displaced costs nothing. Pixels
+// weigh the same, as in ShadowError. The bias must be larger than length * slope, the slope of the surface as the light
+// sees it, or the surface is taken for its own shadow.
+Prediction predict(const RayCaster& caster, const View& view, const vec3& to_light, double bias, double length,
+                   int needles = 8, int threads = 1);
