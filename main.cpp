@@ -269,7 +269,7 @@ static std::string report(const Scene& scene, const AnyShadow& any, const Pictur
     TGAImage exact(view.width, view.height, TGAImage::RGB);
     draw_colors(scene, TrueShadow{truth}, p.faces, exact);
     const auto ask = [&](const auto& shadow) { return verdicts_of(scene.models, scene.viewer, shadow, p.faces, p.casters); };
-    return report_line(truth, std::visit(ask, any), p.framebuffer, exact);
+    return report_line(truth, p.faces, std::visit(ask, any), p.framebuffer, exact);
 }
 
 // ---- the command line ----

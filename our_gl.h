@@ -90,7 +90,7 @@ struct DepthBuffer : Buffer<float> {
     DepthBuffer(int width, int height) : Buffer(width, height, -std::numeric_limits<float>::infinity()) {}
 };
 
-// The most that a depth of the buffer differs from the exact one: half a unit in the last place of a float below 2048.
+// The most that a depth in [0,screen_depth] differs from the exact one: half a unit in the last place of a float below 2048.
 constexpr double depth_rounding = 1. / (1 << 14);
 
 // The number of the face that is nearest, -1 where nothing was drawn.

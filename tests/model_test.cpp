@@ -643,6 +643,12 @@ TEST("a polygon is cut alike at every scale, to the ends of the double's range")
              {1e-30, 1e38, 1e300, std::ldexp(1., 1017), std::ldexp(1., -1074), std::ldexp(1., -1040)})
             CHECK_EQ(faces(in_plane(shape, {2, 1, 0}, {-1, 3, 1}, scale)), expected);
     }
+    CHECK_EQ(faces(in_plane(centred, {2, 1, 0}, {-1, 3, 1}, std::ldexp(1., 1019))),
+             faces(in_plane(centred, {2, 1, 0}, {-1, 3, 1})));
+    // A tiny one far from the origin, across the direction to it.
+    std::string far = in_plane(p, {0, 1e-300, 0}, {0, 0, 1e-300});
+    for (std::size_t at = 0; (at = far.find("v 0 ", at)) != far.npos;) far.replace(at, 4, "v 1 ");
+    CHECK_EQ(faces(far), faces(in_plane(p)));
 }
 
 TEST("polygons of 100 000 corners") {
@@ -728,6 +734,8 @@ TEST("faces without area contribute nothing") {
     const std::string expected = normals(load(obj), 0);
     CHECK_EQ(normals(load(obj + "f 1 1 2\nf 2 2 2\nf 1 4 5\nf 3 1 3\n"), 0),
              expected);  // .1, .2, .3 are not on a line in binary
+    // Rounding leaves the product of these edges, which are parallel, a component of 4e-17. It must not have a normal.
+    CHECK_EQ(normals(load("v 0 0 0\nv .1 .1 .6\nv .3 .3 1.8\nf 1 2 3\n"), 0), "0 0 1, 0 0 1, 0 0 1");
     const Model m = load(obj + "f 4 5 6\nf 1 1 6\n");
     check_invariants(m);
     CHECK_EQ(normals(m, 0), expected);
@@ -768,6 +776,7 @@ TEST("given normals are normalised; one without length is made") {
     check_near(m.normal(0, 1), {.6, 0, .8}, few_roundings);
     CHECK_EQ(text(m.normal(0, 2)), "0 1 0");
     CHECK_EQ(normals(m, 1), "0 0 1, 0 0 1, 0 0 1");
+    CHECK_EQ(normals(load(square + "vn 0 0 0\nf 1//1 3//1 2//1\n"), 0), "0 0 -1, 0 0 -1, 0 0 -1");
 }
 
 // ---- materials ----
@@ -787,6 +796,13 @@ TEST("faces are grouped by material, in the order of their first faces") {
     CHECK_EQ(text(m.materials()[0].Kd), "0 0 1");
     CHECK_EQ(m.groups()[0].end, 3);
     CHECK_EQ(notes(m), "");
+
+    std::string many = square + "mtllib m.mtl\n", blue, red;
+    for (int i = 0; i < 100; i++) {
+        many += "v 0 0 0\n" + std::string(i % 2 ? "usemtl red" : "usemtl blue") + "\nf 1 2 -1\n";
+        (i % 2 ? red : blue) += (blue.empty() ? "0 1 " : ", 0 1 ") + std::to_string(4 + i);
+    }
+    CHECK_EQ(faces(Model(folder.write("m.obj", many))), blue + red);  // stably
 }
 
 TEST("an unknown material is the default one, with a note") {
@@ -932,7 +948,8 @@ TEST("the maps of an .mtl, relative to it, before those by suffix") {
     folder.write("lib/m.mtl",
                  "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ks s.TGA\nnorm -bm 0.5 n.tga\n"
                  "map_Bump -bm 1 bump.tga\nmap_Ke -mm 0 1 -blendu off -type sphere -imfchan l e.tga \r\n"
-                 "newmtl part\n  map_Kd\tmy maps/a b.tga\nnewmtl none\nKa 0 0 0\nnewmtl bumpy\nbump bump.tga\n");
+                 "newmtl part\n  map_Kd\tmy maps/a b.tga\nnewmtl none\nmap_Kd gone.tga\nnewmtl none\nKa 0 0 0\nnewmtl "
+                 "bumpy\nbump bump.tga\n");
     const std::string obj = "mtllib lib/m.mtl\n" + square + extras;
     std::string each;
     for (const char* name : {"full", "part", "none", "bumpy"})

@@ -1,6 +1,6 @@
 // scenes_test.cpp: many small pictures, each of one feature, and the default render; every one must be its reference in
-// tests/reference. Geometry and command line stand together: `scenes_test NAME` runs one scene. It says nothing about
-// what is right beyond that a person once looked at the references; the error report does.
+// tests/reference. Geometry and command line stand together: `scenes_test NAME` runs one scene, and the target
+// update_references makes all references anew. It knows nothing of what is right but that a person looked at them.
 #include "check.h"
 #include "compare.h"
 #include "files.h"
@@ -45,7 +45,8 @@ struct Folder : TemporaryFolder {
     // Runs the program with these arguments here, and returns the picture that it wrote.
     TGAImage run(const std::string& arguments, const std::string& picture) const {
         const std::string q = "\"";
-        const std::string go = "cd " + q + path().string() + q + " && " + q + UMBRA_BINARY + q + " --quiet " + arguments;
+        const std::string folder = q + path().string() + q, program = q + UMBRA_BINARY + q;
+        const std::string go = "cd " + folder + " && " + program + " --quiet " + arguments;
         if (std::system((go + " >output.txt 2>&1").c_str()) != 0) {
             const Bytes output = read_bytes(path() / "output.txt");
             throw std::runtime_error("umbra " + arguments + ": " + std::string(output.begin(), output.end()));
@@ -97,7 +98,8 @@ public:
         text_ << f << '\n';
     }
     // A quadrangle whose texture coordinates run from LOW at its first corner to HIGH at its third, the opposite one.
-    void quad(const vec3& a, const vec3& b, const vec3& c, const vec3& d, const vec2& low = {0, 0}, const vec2& high = {1, 1}) {
+    void quad(const vec3& a, const vec3& b, const vec3& c, const vec3& d, const vec2& low = {0, 0},
+              const vec2& high = {1, 1}) {
         const vec3 corners[] = {a, b, c, d};
         const vec2 uvs[] = {low, {high.x, low.y}, high, {low.x, high.y}};
         std::string f = "f";
@@ -118,7 +120,9 @@ public:
     }
     // Six quads, seen from outside, or from inside where LOW and HIGH are exchanged.
     void box(const vec3& low, const vec3& high) {
-        const auto at = [&](int x, int y, int z) { return vec3{x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z}; };
+        const auto at = [&](int x, int y, int z) {
+            return vec3{x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z};
+        };
         quad(at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1));
         quad(at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0));
         quad(at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1));
@@ -169,7 +173,8 @@ TGAColor rgb(int r, int g, int b) {
 }
 
 // n x n squares of so many pixels each, the bottom-left one dark.
-TGAImage checkers(int n, int pixels, const TGAColor& dark = rgb(60, 70, 90), const TGAColor& light = rgb(200, 200, 190)) {
+TGAImage checkers(int n, int pixels, const TGAColor& dark = rgb(60, 70, 90),
+                  const TGAColor& light = rgb(200, 200, 190)) {
     TGAImage picture(n * pixels, n * pixels, TGAImage::RGB);
     for (int y = 0; y < n * pixels; y++)
         for (int x = 0; x < n * pixels; x++) picture.set(x, y, (x / pixels + y / pixels) % 2 ? light : dark);
@@ -252,22 +257,25 @@ SCENE(edge_rule) {
             for (int y = 0; y < 9; y++)
                 for (int x = 0; x < 9; x++) {
                     if ((x + y) % 2 != colour) continue;
-                    const auto at = [&](int i, int j) { return vec3{(8 * (x + i) - 35.5) / 36, (8 * (y + j) - 35.5) / 36, 0}; };
+                    const auto at = [&](int i, int j) {
+                        return vec3{(8 * (x + i) - 35.5) / 36, (8 * (y + j) - 35.5) / 36, 0};
+                    };
                     obj.use(colour == 0 ? (half == 0 ? "red" : "dark_red") : (half == 0 ? "blue" : "dark_blue"));
                     if (half == 0) obj.polygon({at(0, 0), at(1, 0), at(1, 1)});
                     else obj.polygon({at(0, 0), at(1, 1), at(0, 1)});
                 }
     folder.write("grid.obj", obj.text());
-    return folder.frame("--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1 grid.obj");
+    return folder.frame("--size 96x96 --shadow off --no-fit --eye 0,0,4 --light 0,0,1 grid.obj");
 }
 
-// One quad from far in front of the eye to far behind it.
+// One quad from far in front of the eye to far behind it. The eye is close to it: the lowest pixels show what is a tenth
+// of the way to the centre.
 SCENE(near_plane) {
     Obj obj;
-    obj.quad({-8, -.5, 10}, {8, -.5, 10}, {8, -.5, -10}, {-8, -.5, -10}, {0, 0}, {8, 10});
+    obj.quad({-8, -.5, 10}, {8, -.5, 10}, {8, -.5, -10}, {-8, -.5, -10}, {0, 0}, {32, 40});
     folder.write("floor.obj", obj.text());
     folder.write("floor_diffuse.tga", checkers(2, 4));
-    return folder.frame("--size 128x96 --shadow off --no-fit --eye .3,.3,2 --light .3,1,.5 floor.obj");
+    return folder.frame("--size 128x96 --shadow off --no-fit --eye .3,-.36,2 --center 0,-.5,0 --light .3,1,.5 floor.obj");
 }
 
 // Six triangles a million pixels large meet in the middle. In front of them is a small hexagon in lighter and darker
@@ -352,13 +360,15 @@ SCENE(concave_polygons) {
     constexpr double x[] = {0, .5878, .9511}, y[] = {1, .8090, .3090};  // sine and cosine of 0, 36 and 72 degrees
     const vec2 turns[] = {{x[0], y[0]}, {-x[1], y[1]}, {-x[2], y[2]}, {-x[2], -y[2]}, {-x[1], -y[1]},
                           {x[0], -y[0]}, {x[1], -y[1]}, {x[2], -y[2]}, {x[2], y[2]}, {x[1], y[1]}};
-    for (int i = 0; i < 10; i++) star.push_back(vec3{turns[i].x, turns[i].y, 0} * (i % 2 ? .18 : .45) + vec3{-.5, .5, 0});
+    for (int i = 0; i < 10; i++)
+        star.push_back(vec3{turns[i].x, turns[i].y, 0} * (i % 2 ? .18 : .45) + vec3{-.5, .5, 0});
     obj.polygon(star);
     obj.use("red");
     obj.polygon({{.05, .1, 0}, {.5, .4, 0}, {.95, .1, 0}, {.5, .95, 0}});
     obj.use("cyan");
-    obj.polygon({{-.9, -.95, 0}, {.9, -.95, 0}, {.9, -.1, 0}, {-.6, -.1, 0}, {-.6, -.65, 0}, {.5, -.65, 0}, {.5, -.4, 0},
-                 {-.3, -.4, 0}, {-.3, -.3, 0}, {.65, -.3, 0}, {.65, -.8, 0}, {-.75, -.8, 0}, {-.75, 0, 0}, {-.9, 0, 0}});
+    obj.polygon({{-.9, -.95, 0}, {.9, -.95, 0}, {.9, -.1, 0}, {-.6, -.1, 0}, {-.6, -.65, 0}, {.5, -.65, 0},
+                 {.5, -.4, 0}, {-.3, -.4, 0}, {-.3, -.3, 0}, {.65, -.3, 0}, {.65, -.8, 0}, {-.75, -.8, 0},
+                 {-.75, 0, 0}, {-.9, 0, 0}});
     folder.write("polygons.obj", obj.text());
     return folder.frame("--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1 polygons.obj");
 }
@@ -399,7 +409,8 @@ SCENE(center_and_up) {
     obj.quad(at + vec3{-.8, -.8, 0}, at + vec3{.8, -.8, 0}, at + vec3{.8, .8, 0}, at + vec3{-.8, .8, 0});
     folder.write("card.obj", obj.text());
     folder.write("card_diffuse.tga", letter());
-    return folder.frame("--size 96x96 --shadow off --no-fit --eye 2,1,1 --center 2,1,-3 --up 1,2,0 --light 0,0,1 card.obj");
+    return folder.frame("--size 96x96 --shadow off --no-fit --eye 2,1,1 --center 2,1,-3 --up 1,2,0 --light 0,0,1 "
+                        "card.obj");
 }
 
 // The yard, 40 times as large and far away from the origin: it is fitted, and looks like shadow_map.

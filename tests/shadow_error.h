@@ -70,7 +70,9 @@ Verdicts verdicts_of(const std::vector<Model>& models, const Camera& viewer, con
     return v;
 }
 
-// One line of name value pairs: the pixels whose surface faces the light, those of them that are falsely dark (and of these
-// the ones darkened by their own face) and falsely lit, as counts and in percent; the root of the mean square of what the
-// model's pixels are off by, over their channels, from the picture with exact shadows.
-std::string report_line(const TruthImage& truth, const Verdicts& verdicts, const TGAImage& picture, const TGAImage& exact);
+// One line of name value pairs: pixels that only one of picture and truth covers (a silhouette within the snapping of the
+// corners: no shadow's doing, and left out of what follows); the pixels whose surface faces the light; those of them that
+// are falsely dark (and of these the ones darkened by their own face) and falsely lit, as counts and in percent; and the
+// root of the mean square of what the facing pixels' channels are off by from the picture with exact shadows.
+std::string report_line(TruthImage truth, const FaceBuffer& faces, const Verdicts& verdicts, const TGAImage& picture,
+                        const TGAImage& exact);
