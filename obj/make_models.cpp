@@ -1,14 +1,11 @@
 // make_models.cpp: the program that makes every model and texture of this folder out of formulas. It is not part of the
 // renderer and not of the default build; its output is committed. Lesson paragraph: none, it only prepares the input.
 //
-// The idol is a signed distance function: a solid is { p : sdf(p) < 0 }, parts are joined by smooth minima. From it come
-// a triangle mesh (sections "mesh" and "simplify"), a texture atlas ("atlas") and, texel by texel, the maps ("bake"):
-// a texel's colour and normal depend on its point in space alone, therefore no seam shows where two charts meet.
-// The output is the same byte for byte from every compiler: beyond + - * / only sqrt, floor, fabs, min and max are used,
-// all exactly rounded, and no result depends on the order in which threads run.
-#include "geometry.h"
-#include "tgaimage.h"
-
+// The idol is a signed distance function: a solid is { p : sdf(p) < 0 }, parts are joined by smooth minima. From it
+// come a triangle mesh (sections "mesh" and "simplify"), a texture atlas ("atlas") and, texel by texel, the maps
+// ("bake"): a texel's colour and normal depend on its point in space alone, therefore no seam shows where two charts
+// meet. The output is the same byte for byte from every compiler: beyond + - * / only sqrt, floor, fabs, min and max
+// are used, all exactly rounded, and no result depends on the order in which threads run.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -24,6 +21,9 @@
 #include <thread>
 #include <vector>
 
+#include "geometry.h"
+#include "tgaimage.h"
+
 namespace {
 
 // ---- small mathematics ----
@@ -31,12 +31,14 @@ namespace {
 double clamp01(double x) { return std::min(1., std::max(0., x)); }
 double mix(double a, double b, double t) { return a + (b - a) * t; }
 vec3 mix(const vec3& a, const vec3& b, double t) { return a + (b - a) * t; }
+// From 0 at lo to 1 at hi; lo may be the larger.
 double smoothstep(double lo, double hi, double x) {
     const double t = clamp01((x - lo) / (hi - lo));
     return t * t * (3 - 2 * t);
 }
 
-// sin(2 pi t) by its Taylor series on a quarter of a turn: the error is below 1e-8, and the bytes are everywhere the same.
+// sin(2 pi t) by its Taylor series on a quarter of a turn: the error is below 6e-8, the first term left out. The
+// library's own sine may be rounded differently by a compiler that evaluates it beforehand.
 double sin_turns(double t) {
     t -= std::floor(t);
     if (t > .5) return -sin_turns(t - .5);
@@ -46,13 +48,17 @@ double sin_turns(double t) {
 }
 double cos_turns(double t) { return sin_turns(t + .25); }
 
-// The angle of (x,y) in turns, in [-1/2,1/2]: a minimax polynomial for atan on [0,1], error about 1e-6 turns.
+// The angle of (x,y) in turns, in [-1/2,1/2], by the polynomial for the arc tangent on [0,1] of Abramowitz and Stegun,
+// "Handbook of Mathematical Functions", 4.4.49: the error is below 2e-8 radians.
 double atan_turns(double y, double x) {
     const double ax = std::fabs(x), ay = std::fabs(y), largest = std::max(ax, ay);
     if (!(largest > 0)) return 0;
-    const double q = std::min(ax, ay) / largest, s = q * q;
-    double a = q * (.15915494 * (.9999993329 + s * (-.3332985605 + s * (.1994653599 + s * (-.1390853351 +
-               s * (.0964200441 + s * (-.0559098861 + s * (.0218612288 + s * -.0040540580))))))));
+    const double q = std::min(ax, ay) / largest;
+    double sum = 0;
+    for (const double c :
+         {-.0040540580, .0218612288, -.0559098861, .0964200441, -.1390853351, .1994653599, -.3332985605, .9999993329})
+        sum = sum * q * q + c;
+    double a = sum * q * .15915494309189535;
     if (ay > ax) a = .25 - a;
     if (x < 0) a = .5 - a;
     return y < 0 ? -a : a;
@@ -152,16 +158,22 @@ constexpr double turn_cos = 0.9563047559630354, turn_sin = 0.2923717047227368;  
 vec3 to_idol(const vec3& p) { return {p.x * turn_cos - p.z * turn_sin, p.y, p.x * turn_sin + p.z * turn_cos}; }
 vec3 from_idol(const vec3& p) { return {p.x * turn_cos + p.z * turn_sin, p.y, p.z * turn_cos - p.x * turn_sin}; }
 
-// The two halves are mirror images. A smooth |x| keeps the surface smooth across the mirror plane: no crease, no dark line.
+// The two halves are mirror images. A smooth |x| keeps the surface smooth across the mirror plane: there is no crease.
 double mirrored(double x) { return std::sqrt(x * x + 1e-4); }
 
 // A horn's axis: a curve of degree five through space, its control points those of a Bezier curve.
-constexpr vec3 horn_control[6] = {{.10, .34, .03}, {.38, .58, -.10}, {.64, .56, -.26},
-                                  {.82, .82, -.06}, {.84, .60, .50}, {.34, .16, .61}};
-struct HornPoint { double t, distance, radius, along; vec3 offset, tangent; };  // along: length of the curve up to t
+constexpr vec3 horn_control[6] = {{.10, .34, .03},  {.38, .58, -.10}, {.64, .56, -.26},
+                                  {.82, .82, -.06}, {.84, .60, .50},  {.34, .16, .61}};
+// The point C(t) of the axis nearest to a point in space.
+struct HornPoint {
+    double t, distance;  // parameter; how far away it is
+    double radius;       // of the horn there
+    double along;        // length of the axis up to there
+    vec3 offset;         // from the axis to the point in space
+};
 
 struct HornCurve {
-    vec3 c[6];               // power basis
+    vec3 c[6];  // power basis
     vec3 sample[33];
     double length[33] = {};
     HornCurve() {
@@ -197,7 +209,8 @@ struct HornCurve {
         }
         const vec3 q = p - at(t);
         const int i = std::min(31, static_cast<int>(t * 32));
-        return {t, norm(q), .102 * (1 - t * t * t) * (1 - .25 * t) + .006, mix(length[i], length[i + 1], t * 32 - i), q, slope(t)};
+        return {t, norm(q), .102 * (1 - t * t * t) * (1 - .25 * t) + .006, mix(length[i], length[i + 1], t * 32 - i),
+                q};
     }
 };
 const HornCurve horn_curve;
@@ -220,22 +233,26 @@ constexpr double eye_radius = .072;
 
 // The distances to the parts, one for each material.
 enum Part { Stone, Hair, Horn, Gold, Crystal, Eye, part_count };
-struct Parts { double d[part_count]; };
+struct Parts {
+    double d[part_count];
+};
 
+// The parts of the head, in its own coordinates, with x >= 0.
 double face(const vec3& p) {
-    double d = smin(ellipsoid(p, {0, .215, -.03}, {.262, .29, .335}), ellipsoid(p, {0, -.01, .10}, {.2, .255, .225}), .11);
-    d = smin(d, rod(p, {.168, -.06, .02}, {.045, -.2, .22}, .055, .05), .06);        // jaw
-    d = smin(d, ellipsoid(p, {0, -.212, .262}, {.072, .052, .062}), .05);            // chin
-    d = smin(d, rod(p, {.205, .07, .10}, {.125, .04, .245}, .045, .04), .05);        // cheekbone
-    d = smax(d, -ellipsoid(p, {.2, -.06, .235}, {.05, .075, .08}), .08);             // the hollow below it
-    d = smax(d, -ellipsoid(p, {.30, .2, .15}, {.05, .08, .1}), .06);                 // temple
-    d = smin(d, ellipsoid(p, {0, .285, .12}, {.2, .13, .175}), .06);                 // forehead
-    d = smax(d, -ellipsoid(p, {.112, .128, .335}, {.082, .05, .085}), .045);         // eye socket
-    d = smin(d, rod(p, {.028, .170, .318}, {.105, .206, .298}, .018, .019), .045);    // brow
+    double d =
+        smin(ellipsoid(p, {0, .215, -.03}, {.262, .29, .335}), ellipsoid(p, {0, -.01, .10}, {.2, .255, .225}), .11);
+    d = smin(d, rod(p, {.168, -.06, .02}, {.045, -.2, .22}, .055, .05), .06);       // jaw
+    d = smin(d, ellipsoid(p, {0, -.212, .262}, {.072, .052, .062}), .05);           // chin
+    d = smin(d, rod(p, {.205, .07, .10}, {.125, .04, .245}, .045, .04), .05);       // cheekbone
+    d = smax(d, -ellipsoid(p, {.2, -.06, .235}, {.05, .075, .08}), .08);            // the hollow below it
+    d = smax(d, -ellipsoid(p, {.30, .2, .15}, {.05, .08, .1}), .06);                // temple
+    d = smin(d, ellipsoid(p, {0, .285, .12}, {.2, .13, .175}), .06);                // forehead
+    d = smax(d, -ellipsoid(p, {.112, .128, .335}, {.082, .05, .085}), .045);        // eye socket
+    d = smin(d, rod(p, {.028, .170, .318}, {.105, .206, .298}, .018, .019), .045);  // brow
     d = smin(d, rod(p, {.105, .206, .298}, {.200, .198, .205}, .019, .012), .055);
-    d = smax(d, -rod(p, {0, .21, .338}, {.0, .185, .345}, .002, .002), .03);         // frown
+    d = smax(d, -rod(p, {0, .21, .338}, {.0, .185, .345}, .002, .002), .03);  // frown
     // eyelids: a shell around the eyeball, open between two planes through its centre
-    const vec3 q{p.x - eye_centre.x, p.y - eye_centre.y, p.z - eye_centre.z};
+    const vec3 q = p - eye_centre;
     const double ey = q.y - .14 * q.x;  // the outer corner stands higher
     const double upper = ey * .95 - q.z * .33, lower = -ey * .96 - q.z * .27;
     const double ball = norm(q);
@@ -269,17 +286,16 @@ double ear(const vec3& p) {  // pointed, below the horn
     return smax(d, -rod(p, {.27, .10, .005}, {.40, .18, -.075}, .030, .004), .02);
 }
 
-double torso(const vec3& p) {
-    const double far = p.y - (-.02);
+// The trunk without the muscles of the neck: the collar lies on this.
+double trunk(const vec3& p) {
+    const double far = p.y - .02;
     if (far > .2) return far;
     double d = rod(p, {0, -.1, -.06}, {0, -.5, -.09}, .185, .195);
-    d = smin(d, rod(p, {.19, .0, -.06}, {.035, -.475, .125}, .04, .032), .05);         // the neck's muscle
-    d = smin(d, rod(p, {.0, -.2, -.16}, {.47, -.56, -.12}, .1, .08), .14);           // trapezius
+    d = smin(d, rod(p, {.0, -.2, -.16}, {.47, -.56, -.12}, .1, .08), .14);  // trapezius
+    d = smin(d, rod(p, {.1, -.48, -.02}, {.46, -.59, -.05}, .10, .09), .08);
     d = smin(d, ellipsoid(p, {0, -.78, -.05}, {.5, .31, .25}), .12);
-    d = smin(d, ellipsoid(p, {.49, -.72, -.08}, {.18, .26, .2}), .10);               // shoulder
-    d = smin(d, ellipsoid(p, {.2, -.71, .10}, {.22, .14, .12}), .06);                // breast
-    d = smin(d, rod(p, {.04, -.505, .15}, {.46, -.505, .02}, .026, .03), .05);         // collar bone
-    d = smax(d, -ellipsoid(p, {0, -.475, .17}, {.03, .03, .03}), .04);
+    d = smin(d, ellipsoid(p, {.49, -.72, -.08}, {.18, .26, .2}), .10);  // shoulder
+    d = smin(d, ellipsoid(p, {.2, -.71, .10}, {.22, .14, .12}), .06);   // breast
     d = smax(d, p.x - .60, .03);
     return smax(d, -.81 - p.y, .02);
 }
@@ -312,11 +328,9 @@ double over_band(const vec3& h) { return h.y - .318 - (.2 - h.z) * .12; }
 double skull_cap(const vec3& h) { return ellipsoid(h, {0, .225, -.04}, {.28, .305, .362}); }
 
 // How far a point is from the base of the neck: the rings of the collar.
-double collar_radius(const vec3& p) {
-    const vec3 q{p.x / 1.22, p.y + .33, p.z + .05};
-    return norm(q);
-}
+double collar_radius(const vec3& p) { return norm(vec3{p.x / 1.22, p.y + .33, (p.z + .075) / 1.3}); }
 
+// The distances from a point of the model's space. Far from the head a lower bound stands for its parts.
 Parts parts(const vec3& world) {
     const vec3 l = to_idol(world), p{mirrored(l.x), l.y, l.z};
     vec3 h = to_head(l);
@@ -330,6 +344,7 @@ Parts parts(const vec3& world) {
         const double cap = skull_cap(h), band = over_band(h);
         const double locks = .009 * std::fabs(sin_turns(h.x * 11 + .25)) * smoothstep(-.02, .08, band);
         out.d[Hair] = smax(cap - locks, -std::max(band, std::min(band + .4, -.12 - h.z + h.y * .2)), .02);
+        out.d[Hair] = smin(out.d[Hair], ellipsoid(h, {0, -.01, -.235}, {.15, .22, .10}), .07);
         // circlet and the setting of the crystal
         double gold = smax(cap - .016, std::fabs(band) - .021, .008);
         const vec3 g{h.x, h.y - .335, h.z - .302};
@@ -345,10 +360,11 @@ Parts parts(const vec3& world) {
     stone = smin(stone, out.d[Horn] + .02, .05);
     out.d[Hair] = smin(out.d[Hair], out.d[Horn] + .02, .05);
     for (double& d : out.d) d *= head_scale;
-    const double body = torso(p), R = collar_radius(p);
-    stone = smin(stone, body, .04);
+    const double body = trunk(p), R = collar_radius(p);
+    const double muscle = rod(p, {.19, .0, -.06}, {.05, -.42, .10}, .04, .03);  // from the ear to the breastbone
+    stone = smin(stone, p.y > .2 ? body : smin(body, muscle, .05), .04);
     stone = std::min(stone, pedestal(p));
-    const double collar = smax(body - .013, std::max(std::fabs(R - .275) - .075, p.y + .36 - p.z * .2), .01);
+    const double collar = smax(body - .016, std::max(std::fabs(R - .275) - .075, p.y + .30 - .3 * (p.z + .1)), .01);
     out.d[Gold] = std::min(out.d[Gold], collar);
     return out;
 }
@@ -362,7 +378,8 @@ double idol(const vec3& p) {
 
 template <typename F>
 vec3 gradient(const F& f, const vec3& p, double e) {  // by four values at the corners of a tetrahedron of size e
-    const double a = f(p + vec3{e, -e, -e}), b = f(p + vec3{-e, -e, e}), c = f(p + vec3{-e, e, -e}), d = f(p + vec3{e, e, e});
+    const double a = f(p + vec3{e, -e, -e}), b = f(p + vec3{-e, -e, e}), c = f(p + vec3{-e, e, -e}),
+                 d = f(p + vec3{e, e, e});
     return vec3{a - b - c + d, -a - b + c + d, -a + b - c + d} / (4 * e);
 }
 
@@ -378,37 +395,47 @@ vec3 onto_surface(vec3 p) {  // along the gradient, by Newton's method
 Part part_at(const Parts& s) { return static_cast<Part>(std::min_element(s.d, s.d + part_count) - s.d); }
 
 double cracks(const vec3& p) {  // 1 in a crack, 0 beside it
-    const vec3 warped = p * 2.6 + vec3{fbm(p * 5, 3), fbm(p * 5 + vec3{9, 9, 9}, 3), fbm(p * 5 + vec3{5, 1, 8}, 3)} * .5;
-    const double here = smoothstep(.05, .3, noise(p * 1.7 + vec3{3.3, 1.1, 8.2}));
+    const vec3 warped =
+        p * 2.6 + vec3{fbm(p * 5, 3), fbm(p * 5 + vec3{9, 9, 9}, 3), fbm(p * 5 + vec3{5, 1, 8}, 3)} * .5;
+    const vec3 h = to_head(to_idol(p));
+    const double here =
+        smoothstep(.05, .3, noise(p * 1.7 + vec3{3.3, 1.1, 8.2})) * smoothstep(.12, .2, norm(h - vec3{.03, .08, .3}));
     return here * (1 - smoothstep(.002, .011, cell_wall(warped)));
 }
 
-// The collar's ornaments: rows of rounded plates between rims. Returns height in [0,1]; enamel: 1 on the coloured ones.
+// The collar's ornaments: rows of rounded plates between rims. Returns the height in [0,1]; enamel becomes 1 on the
+// coloured row and stays 0 elsewhere.
 double collar_relief(const vec3& p, double& enamel) {
-    const double R = collar_radius(p), turn = atan_turns(p.x / 1.22, p.z + .05);
+    const double R = collar_radius(p), turn = atan_turns(p.x / 1.22, (p.z + .075) / 1.3);
     const double row = (R - .2) / .05, r = row - std::floor(row);
     const int k = static_cast<int>(std::floor(row));
     const double count = k <= 0 ? 48 : k == 1 ? 56 : 40;
     const double s = turn * count + .5 * (k & 1), c = std::fabs(s - std::floor(s) - .5) * 2;
     const double plate = smoothstep(.0, .16, r - .08) * (1 - smoothstep(.8, .94, r)) * (1 - smoothstep(.72, .98, c));
-    enamel = (k == 1 ? 1. : 0.) * plate;
+    enamel = k == 1 ? plate : 0;
     return plate;
 }
 
-// Gold leaf let into the stone: two lines below each eye, dots over the brow, a meander around the pedestal. 1 on the gold.
+// Gold leaf let into the stone: two lines below each eye, dots over the brow, a meander around the
+// pedestal. 1 on the gold.
 double inlay(const vec3& l, const vec3& h) {
     double line = 9;
     if (h.z > .1 && h.y > -.2) {
         const double x = std::fabs(h.x);
         const vec3 q{x, h.y, 0};
-        line = std::min(rod(q, {.082, .05, 0}, {.075, -.035, 0}, .0065, .002), rod(q, {.118, .053, 0}, {.128, -.06, 0}, .0065, .002));
-        for (int i = 0; i < 5; i++) line = std::min(line, norm(q - vec3{.05 + .032 * i, .222 + .018 * i - .0028 * i * i, 0}) - .0085 + .0008 * i);
+        line = std::min(rod(q, {.082, .05, 0}, {.075, -.035, 0}, .0065, .002),
+                        rod(q, {.118, .053, 0}, {.128, -.06, 0}, .0065, .002));
+        for (int i = 0; i < 5; i++)
+            line =
+                std::min(line, norm(q - vec3{.05 + .032 * i, .222 + .018 * i - .0028 * i * i, 0}) - .0085 + .0008 * i);
     }
     if (l.y < -.87 && l.y > -.96) {
         constexpr const char* meander[5] = {"######## ", "#      # ", "# #### # ", "# #    # ", "# ###### "};
         const double along = std::fabs(l.x) > .66 ? l.z : l.x, cell = .011;
-        const int column = static_cast<int>(std::floor(along / cell + 900)) % 9, row = static_cast<int>(std::floor((-.888 - l.y) / cell));
-        if (row >= 0 && row < 5 && (std::fabs(l.x) > .675 || l.z > .285 || l.z < -.345)) line = meander[row][column] == '#' ? -.01 : .01;
+        const int column = static_cast<int>(std::floor(along / cell + 900)) % 9,
+                  row = static_cast<int>(std::floor((-.888 - l.y) / cell));
+        if (row >= 0 && row < 5 && (std::fabs(l.x) > .675 || l.z > .285 || l.z < -.345))
+            line = meander[row][column] == '#' ? -.01 : .01;
     }
     return smoothstep(.002, -.002, line);
 }
@@ -418,29 +445,30 @@ double relief(const vec3& p, const Parts& s) {
     const vec3 l = to_idol(p), h = to_head(l);
     const vec3 m{mirrored(h.x), h.y, h.z};
     switch (part_at(s)) {
-    case Stone: {
-        const double smooth = smoothstep(.36, .22, norm(h - vec3{0, .08, .22}));  // the face was polished
-        const double grain = .0008 * noise(p * 105) + .0016 * fbm(p * 40, 3) + .003 * fbm(p * 12, 2);
-        const double pits = .004 * smoothstep(.45, .75, noise(p * 38)) * smoothstep(.0, .3, noise(p * 5));
-        return mix(1, .6, smooth) * (grain - pits) - .006 * cracks(p) - .002 * inlay(l, h);
-    }
-    case Hair: {
-        const double u = h.x * 70 + 1.2 * noise(h * 9);
-        return .0022 * sin_turns(u) + .0012 * noise(vec3{h.x * 190, h.y * 12, h.z * 12});
-    }
-    case Horn: {
-        const HornPoint q = horn_curve.nearest(m);
-        const vec3 round = q.offset / std::max(.01, q.distance);
-        return .0012 * noise(vec3{round.x * 16, round.y * 16, round.z * 16 + q.along * 4}) + .0010 * noise(vec3{q.along * 160, round.x * 3, round.y * 3}) +
-               .0008 * noise(p * 90);
-    }
-    case Gold: {
-        double enamel;
-        const double ornament = l.y < -.3 ? .006 * collar_relief(l, enamel) : .003 * smoothstep(.2, .5, sin_turns(atan_turns(h.x, h.z + .045) * 72)) * smoothstep(.016, .010, std::fabs(over_band(h)));
-        return ornament + .0007 * noise(p * 60);
-    }
-    default:
-        return 0;
+        case Stone: {
+            const double smooth = smoothstep(.36, .22, norm(h - vec3{0, .08, .22}));  // the face was polished
+            const double grain = .0008 * noise(p * 105) + .0012 * fbm(p * 44, 3) + .0028 * fbm(p * 11, 2);
+            const double pits = .004 * smoothstep(.45, .75, noise(p * 38)) * smoothstep(.0, .3, noise(p * 5));
+            return mix(1, .6, smooth) * (grain - pits) - .006 * cracks(p) - .002 * inlay(l, h);
+        }
+        case Hair: {
+            const double u = h.x * 70 + 1.2 * noise(h * 9);
+            return .0022 * sin_turns(u) + .0012 * noise(vec3{h.x * 190, h.y * 12, h.z * 12});
+        }
+        case Horn: {
+            const HornPoint q = horn_curve.nearest(m);
+            const vec3 round = q.offset / std::max(.01, q.distance);
+            return .0012 * noise(round * 16 + vec3{0, 0, q.along * 4}) +
+                   .0010 * noise(vec3{q.along * 160, round.x * 3, round.y * 3}) + .0008 * noise(p * 90);
+        }
+        case Gold: {
+            double enamel;
+            if (l.y < -.23) return .006 * collar_relief(l, enamel) + .0007 * noise(p * 60);
+            const double notches = smoothstep(.2, .5, sin_turns(atan_turns(h.x, h.z + .045) * 72));
+            return .003 * notches * smoothstep(.016, .010, std::fabs(over_band(h))) + .0007 * noise(p * 60);
+        }
+        default:
+            return 0;
     }
 }
 
@@ -449,7 +477,10 @@ double fine_idol(const vec3& p) {
     return *std::min_element(s.d, s.d + part_count) - relief(p, s);
 }
 
-struct Surface { vec3 normal, diffuse, glow; double exponent; };  // colours in [0,1]
+struct Surface {
+    vec3 normal, diffuse, glow;  // unit vector in object space; colours in [0,1]
+    double exponent;
+};
 
 Surface surface(const vec3& p) {
     const Parts s = parts(p);
@@ -464,75 +495,83 @@ Surface surface(const vec3& p) {
         weight *= .72;
     }
     closed = clamp01(closed * 1.1);
-    const double worn = clamp01(-18 * (idol(p + coarse * -.02) + .02) + .1 * 0 + smoothstep(.2, 1.2, 0));
+    const double worn = clamp01(-18 * (idol(p - coarse * .02) + .02));
     const double large = fbm(p * 3.1, 3), mid = fbm(p * 13, 3), fine = fbm(p * 60, 2);
     out.glow = {};
     switch (part_at(s)) {
-    case Stone: {
-        vec3 c = mix({.95, .84, .68}, {.80, .72, .63}, smoothstep(-.3, .3, large));
-        c = mix(c, {.86, .63, .44}, .55 * smoothstep(.05, .35, fbm(vec3{p.x * 2, p.y * 7, p.z * 2}, 3)));
-        c = c * (1 + .22 * mid + .18 * fine);
-        c = mix(c, {.9, .85, .74}, .5 * worn);
-        const double run = smoothstep(-.05, .3, fbm(vec3{p.x * 22, p.y * 3, p.z * 22}, 3)) ;  // verdigris, run down from the gold
-        const double below = l.y < -.3 ? smoothstep(.47, .36, collar_radius(l)) : smoothstep(.14, .03, -over_band(h)) * smoothstep(-.05, .0, -over_band(h));
-        c = mix(c, {.26, .58, .50}, .75 * clamp01(run * below + .6 * closed * smoothstep(.0, .3, large + mid)));
-        c = mix(c, {.26, .19, .14}, clamp01(closed * .62 + .6 * cracks(p)));
-        const double leaf = inlay(l, h) * smoothstep(-.75, -.35, mid + .5 * fine);
-        out.diffuse = mix(c, vec3{1., .70, .24} * (1 - .6 * closed), leaf);
-        out.exponent = mix(14 + 50 * closed + 14 * clamp01(.5 + mid), 22, leaf);
-        break;
-    }
-    case Hair: {
-        const double u = h.x * 70 + 1.2 * noise(h * 9);
-        out.diffuse = vec3{.30, .23, .20} * (1 + .5 * sin_turns(u) * .5 + .4 * mid) * (1 - .7 * closed);
-        out.exponent = 12;
-        break;
-    }
-    case Horn: {
-        const HornPoint q = horn_curve.nearest({mirrored(h.x), h.y, h.z});
-        vec3 c = mix({.36, .25, .17}, {.86, .76, .58}, smoothstep(.1, 1, q.t + .25 * mid));
-        c = c * (.62 + .5 * horn_rings(q.along) + .3 * mid) * (1 + .3 * noise(vec3{q.along * 160, q.offset.x * 30, q.offset.y * 30}));
-        out.diffuse = mix(c, {.10, .07, .05}, .7 * closed);
-        out.exponent = 18 + 20 * q.t;
-        break;
-    }
-    case Gold: {
-        double enamel = 0;
-        const double plate = l.y < -.3 ? collar_relief(l, enamel) : 1;
-        vec3 c = mix({1., .72, .26}, {.86, .50, .20}, clamp01(.5 + large + mid));
-        c = mix(c, {.30, .18, .07}, clamp01(.75 * (1 - plate) + .8 * closed));
-        c = mix(c, {.26, .58, .50}, .6 * clamp01(closed * 1.5) * smoothstep(-.1, .3, mid));
-        c = mix(c, {.05, .34, .46}, enamel);
-        out.diffuse = c;
-        out.exponent = 24 + 10 * mid;
-        break;
-    }
-    case Crystal:
-        out.diffuse = {.2, .75, .85};
-        out.glow = vec3{.05, .62, .80} * (.55 + .5 * clamp01(1 - 14 * std::fabs(h.x)) + .35 * fine);
-        out.exponent = 60;
-        break;
-    default: {  // eye
-        const double side = h.x < 0 ? -1 : 1;  // both eyes look at the default camera
-        const vec3 e = (h - vec3{side * eye_centre.x - .012 - .006 * side, eye_centre.y, eye_centre.z}) / eye_radius;
-        const double r = std::sqrt(e.x * e.x + e.y * e.y), turn = atan_turns(e.y, e.x);
-        const double iris = smoothstep(.56, .50, r), pupil = smoothstep(.07, .02, std::fabs(e.x) - .10 * (1 - 3.4 * e.y * e.y));
-        const double fibres = .8 + .35 * noise(vec3{turn * 40, r * 3, 2});
-        out.diffuse = mix({.55, .62, .58}, {.1, .4, .45}, iris);
-        out.glow = mix(vec3{.04, .27, .32} * (1 - .5 * smoothstep(.6, 1, r)), mix(vec3{.80, 1., .97}, vec3{.04, .78, .90}, smoothstep(.12, .42, r)) * fibres, iris);
-        out.glow = out.glow * (1 - .75 * smoothstep(.44, .50, r) * iris) * (1 - .92 * pupil);
-        out.exponent = 60;
-    }
+        case Stone: {
+            vec3 c = mix({.95, .84, .68}, {.80, .72, .63}, smoothstep(-.3, .3, large));
+            c = mix(c, {.86, .63, .44}, .55 * smoothstep(.05, .35, fbm(vec3{p.x * 2, p.y * 7, p.z * 2}, 3)));
+            c = c * (1 + .22 * mid + .18 * fine);
+            c = mix(c, {.9, .85, .74}, .5 * worn);
+            // verdigris: run down from the gold, and in the crevices
+            const double run = smoothstep(-.05, .3, fbm(vec3{p.x * 22, p.y * 3, p.z * 22}, 3));
+            const double below = l.y < -.23 ? smoothstep(.47, .36, collar_radius(l))
+                                            : smoothstep(.14, .03, -over_band(h)) * smoothstep(-.05, .0, -over_band(h));
+            c = mix(c, {.26, .58, .50}, .75 * clamp01(run * below + .6 * closed * smoothstep(.0, .3, large + mid)));
+            c = mix(c, {.26, .19, .14}, clamp01(closed * .62 + .6 * cracks(p)));
+            const double leaf = inlay(l, h) * smoothstep(-.75, -.35, mid + .5 * fine);
+            out.diffuse = mix(c, vec3{1., .70, .24} * (1 - .6 * closed), leaf);
+            out.exponent = mix(26 + 50 * closed + 14 * clamp01(.5 + mid), 22, leaf);
+            break;
+        }
+        case Hair: {
+            const double u = h.x * 70 + 1.2 * noise(h * 9);
+            out.diffuse = vec3{.30, .23, .20} * (1 + .25 * sin_turns(u) + .4 * mid) * (1 - .7 * closed);
+            out.exponent = 12;
+            break;
+        }
+        case Horn: {
+            const HornPoint q = horn_curve.nearest({mirrored(h.x), h.y, h.z});
+            vec3 c = mix({.36, .25, .17}, {.86, .76, .58}, smoothstep(.1, 1, q.t + .25 * mid));
+            c = c * (.62 + .5 * horn_rings(q.along) + .3 * mid) *
+                (1 + .3 * noise(vec3{q.along * 160, q.offset.x * 30, q.offset.y * 30}));
+            out.diffuse = mix(c, {.10, .07, .05}, .7 * closed);
+            out.exponent = 18 + 20 * q.t;
+            break;
+        }
+        case Gold: {
+            double enamel = 0;
+            const double plate = l.y < -.23 ? collar_relief(l, enamel) : 1;
+            vec3 c = mix({1., .72, .26}, {.86, .50, .20}, clamp01(.5 + large + mid));
+            c = mix(c, {.30, .18, .07}, clamp01(.75 * (1 - plate) + .8 * closed));
+            c = mix(c, {.26, .58, .50}, .6 * clamp01(closed * 1.5) * smoothstep(-.1, .3, mid));
+            c = mix(c, {.05, .34, .46}, enamel);
+            out.diffuse = c;
+            out.exponent = 24 + 10 * mid;
+            break;
+        }
+        case Crystal:
+            out.diffuse = {.2, .75, .85};
+            out.glow = vec3{.05, .62, .80} * (.55 + .5 * clamp01(1 - 14 * mirrored(h.x)) + .35 * fine);
+            out.exponent = 60;
+            break;
+        default: {                                 // eye
+            const double side = h.x < 0 ? -1 : 1;  // both eyes look at the default camera
+            const vec3 e =
+                (h - vec3{side * eye_centre.x - .012 - .006 * side, eye_centre.y, eye_centre.z}) / eye_radius;
+            const double r = std::sqrt(e.x * e.x + e.y * e.y), turn = atan_turns(e.y, e.x);
+            const double iris = smoothstep(.56, .50, r),
+                         pupil = smoothstep(.07, .02, std::fabs(e.x) - .10 * (1 - 3.4 * e.y * e.y));
+            const double fibres = .8 + .35 * noise(vec3{turn * 40, r * 3, 2});
+            out.diffuse = mix({.55, .62, .58}, {.1, .4, .45}, iris);
+            out.glow = mix(vec3{.04, .27, .32} * (1 - .5 * smoothstep(.6, 1, r)),
+                           mix(vec3{.80, 1., .97}, vec3{.04, .78, .90}, smoothstep(.12, .42, r)) * fibres, iris);
+            out.glow = out.glow * (1 - .75 * smoothstep(.44, .50, r) * iris) * (1 - .92 * pupil);
+            out.exponent = 60;
+        }
     }
     // the light that eyes and crystal shed on what is near
     if (part_at(s) != Eye && part_at(s) != Crystal)
         for (const double side : {-1., 0., 1.}) {
-            const vec3 source = side != 0. ? vec3{side * eye_centre.x, eye_centre.y + .0, eye_centre.z + .1} : vec3{0, .335, .38};
+            const vec3 source =
+                side != 0. ? vec3{side * eye_centre.x, eye_centre.y, eye_centre.z + .1} : vec3{0, .335, .38};
             const vec3 lamp = from_idol(from_head(source));
             const vec3 to = lamp - p;
             const double r2 = dot(to, to), facing = dot(out.normal, to) / std::sqrt(r2 + 1e-6);
-            const double e = .0042 * clamp01(facing * .8 + .2) / (r2 + .004) * (1 - smoothstep(.05, .30, r2));
-            for (int i = 0; i < 3; i++) out.glow[i] += std::min(.8, e) * vec3{.10, .75, .85}[i] * (.25 + out.diffuse[i]);
+            const double e = .0055 * clamp01(facing * .8 + .2) / (r2 + .004) * (1 - smoothstep(.05, .30, r2));
+            for (int i = 0; i < 3; i++)
+                out.glow[i] += std::min(.8, e) * vec3{.10, .75, .85}[i] * (.25 + out.diffuse[i]);
         }
     return out;
 }
@@ -556,18 +595,22 @@ void parallel(int n, const F& work) {
     std::atomic<int> next{0};
     std::vector<std::thread> threads;
     for (unsigned k = 0; k < std::max(1u, std::thread::hardware_concurrency()); k++)
-        threads.emplace_back([&] { for (int i; (i = next++) < n;) work(i); });
+        threads.emplace_back([&] {
+            for (int i; (i = next++) < n;) work(i);
+        });
     for (std::thread& t : threads) t.join();
 }
 
-// Throws unless every edge is shared by exactly two faces that run along it in opposite directions, every vertex has one
-// fan of faces around it, no face is degenerate, the volume is positive and the Euler characteristic is as expected.
+// Throws unless every edge is shared by exactly two faces that run along it in opposite directions, every vertex has
+// one fan of faces around it, no face is degenerate, the volume is positive and the Euler characteristic is as
+// expected.
 void check_closed(const Mesh& m, const std::string& name, int euler) {
     std::map<std::pair<int, int>, int> next;  // the directed edge (a,b) of a face -> its third vertex
     double volume = 0;
     for (const Face& f : m.faces) {
         for (int k = 0; k < 3; k++)
-            if (!next.insert({{f[at(k)], f[at((k + 1) % 3)]}, f[at((k + 2) % 3)]}).second) throw std::runtime_error(name + ": an edge is used twice");
+            if (!next.insert({{f[at(k)], f[at((k + 1) % 3)]}, f[at((k + 2) % 3)]}).second)
+                throw std::runtime_error(name + ": an edge is used twice");
         if (!(norm(face_cross(m, f)) > 1e-9)) throw std::runtime_error(name + ": a face is degenerate");
         volume += dot(m.verts[at(f[0])], cross(m.verts[at(f[1])], m.verts[at(f[2])])) / 6;
     }
@@ -577,12 +620,14 @@ void check_closed(const Mesh& m, const std::string& name, int euler) {
         degree[at(edge.first)]++, start[at(edge.first)] = edge.second;
     }
     for (int v = 0; v < static_cast<int>(m.verts.size()); v++) {
-        int turns = 0, w = start[at(v)];
-        if (w >= 0) do w = next.at({v, w}), turns++; while (w != start[at(v)]);
-        if (w < 0 || turns != degree[at(v)]) throw std::runtime_error(name + ": a vertex without exactly one fan");
+        int turns = degree[at(v)] ? 1 : 0;
+        if (turns)
+            for (int w = next.at({v, start[at(v)]}); w != start[at(v)]; w = next.at({v, w})) turns++;
+        if (!turns || turns != degree[at(v)]) throw std::runtime_error(name + ": a vertex without exactly one fan");
     }
     if (!(volume > 0)) throw std::runtime_error(name + ": the faces look inwards");
-    const int chi = static_cast<int>(m.verts.size()) + static_cast<int>(m.faces.size()) - static_cast<int>(next.size() / 2);
+    const int chi =
+        static_cast<int>(m.verts.size()) + static_cast<int>(m.faces.size()) - static_cast<int>(next.size() / 2);
     if (chi != euler) throw std::runtime_error(name + ": Euler characteristic " + std::to_string(chi));
 }
 
@@ -607,8 +652,9 @@ void settle(Mesh& m) {
     }
 }
 
-// Naive surface nets over [-1,1]^3 with n^3 cells: one vertex in every cell that the surface crosses, one quad across every
-// grid edge that it crosses. That is a closed manifold as long as no cell has two sheets in it: such cells are filled.
+// Naive surface nets over [-1,1]^3 with n^3 cells: one vertex in every cell that the surface crosses, one quad across
+// every grid edge that it crosses. That is a closed manifold as long as no cell has two sheets in it: such cells are
+// filled.
 Mesh surface_net(int n) {
     const int m = n + 1;
     const double cell = 2. / n;
@@ -620,7 +666,8 @@ Mesh surface_net(int n) {
     parallel(blocks * blocks * blocks, [&](int b) {
         const int x0 = b % blocks * block, y0 = b / blocks % blocks * block, z0 = b / blocks / blocks * block;
         const double middle = idol(place(x0, y0, z0) + vec3{1, 1, 1} * (block * cell / 2));
-        const bool empty = std::fabs(middle) > 2 * .87 * block * cell;  // twice half the block's diagonal: no surface in it
+        const bool empty =
+            std::fabs(middle) > 2 * .87 * block * cell;  // twice half the block's diagonal: no surface in it
         for (int z = z0; z < std::min(m, z0 + block); z++)
             for (int y = y0; y < std::min(m, y0 + block); y++)
                 for (int x = x0; x < std::min(m, x0 + block); x++)
@@ -628,7 +675,9 @@ Mesh surface_net(int n) {
     });
 
     const auto corner = [&](int x, int y, int z, int c) { return index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)); };
-    const auto one_sheet = [](int inside) {  // are the corners inside, and those outside, connected by edges within each face and the cube?
+    // Whether the surface passes through a cell as one sheet: on no face do opposite corners pair up, nor do they alone
+    // in the whole cube. Bit c of INSIDE tells of corner c.
+    const auto one_sheet = [](int inside) {
         for (int axis = 0; axis < 3; axis++)
             for (int side = 0; side < 2; side++) {
                 const int a = 1 << (axis + 1) % 3, b = 1 << (axis + 2) % 3, o = side << axis;
@@ -680,7 +729,7 @@ Mesh surface_net(int n) {
                         const double a = value[corner(x, y, z, c)], b = value[corner(x, y, z, d)];
                         vec3 p{1. * (c & 1), 1. * (c >> 1 & 1), 1. * (c >> 2)};
                         const double t = std::min(.9, std::max(.1, a / (a - b)));  // no quad shrinks to a point
-                        p[axis] = c >> axis & 1 ? 1 - t : t;
+                        p[axis] = t;
                         sum = sum + p, crossings++;
                     }
                 vertex[cell_index(x, y, z)] = static_cast<int>(out.verts.size());
@@ -742,7 +791,8 @@ Mesh simplify(Mesh m, int target) {
     std::vector<std::vector<int>> fans(m.verts.size());  // the faces around each vertex
     for (int i = 0; i < static_cast<int>(m.faces.size()); i++) {
         const Face& f = m.faces[at(i)];
-        const vec3 c = face_cross(m, f), n = normalized(c), middle = (m.verts[at(f[0])] + m.verts[at(f[1])] + m.verts[at(f[2])]) / 3;
+        const vec3 c = face_cross(m, f), n = normalized(c),
+                   middle = (m.verts[at(f[0])] + m.verts[at(f[1])] + m.verts[at(f[2])]) / 3;
         const double w = norm(c) * importance(middle);
         for (const int v : f) {
             quadric[at(v)].add_plane(n, -dot(n, m.verts[at(v)]), w);
@@ -757,7 +807,11 @@ Mesh simplify(Mesh m, int target) {
     std::vector<bool> dead_face(m.faces.size()), dead(m.verts.size());
     std::vector<int> stamp(m.verts.size());
 
-    struct Candidate { double cost; int a, b, stamp_a, stamp_b; vec3 p; };
+    struct Candidate {
+        double cost;
+        int a, b, stamp_a, stamp_b;
+        vec3 p;
+    };
     const auto later = [](const Candidate& x, const Candidate& y) {
         return x.cost != y.cost ? x.cost > y.cost : x.a != y.a ? x.a > y.a : x.b > y.b;
     };
@@ -804,7 +858,8 @@ Mesh simplify(Mesh m, int target) {
                 for (int k = 0; k < 3; k++) p[k] = t[at(k)] == end ? c.p : m.verts[at(t[at(k)])];
                 const vec3 before = face_cross(m, t), after = cross(p[1] - p[0], p[2] - p[0]);
                 const double longest = std::max(norm(p[1] - p[0]), std::max(norm(p[2] - p[1]), norm(p[0] - p[2])));
-                if (dot(before, after) < .6 * norm(before) * norm(after) || norm(after) < .12 * longest * longest) fine = false;
+                if (dot(before, after) < .6 * norm(before) * norm(after) || norm(after) < .12 * longest * longest)
+                    fine = false;
             }
         if (!fine) continue;
         m.verts[at(c.a)] = c.p;
@@ -831,18 +886,19 @@ Mesh simplify(Mesh m, int target) {
     for (int v = 0; v < nverts; v++)
         if (!dead[at(v)]) renamed[at(v)] = static_cast<int>(out.verts.size()), out.verts.push_back(m.verts[at(v)]);
     for (std::size_t f = 0; f < m.faces.size(); f++)
-        if (!dead_face[f]) out.faces.push_back({renamed[at(m.faces[f][0])], renamed[at(m.faces[f][1])], renamed[at(m.faces[f][2])]});
+        if (!dead_face[f])
+            out.faces.push_back({renamed[at(m.faces[f][0])], renamed[at(m.faces[f][1])], renamed[at(m.faces[f][2])]});
     settle(out);
     return out;
 }
 
 // ---- atlas: the mesh cut into charts that lie flat in the texture ----
 
-struct Textured {  // a mesh ready to be written: what the renderer will read back, decimals and all
+struct Textured {  // a mesh as the renderer will read it back, rounded to the decimals that the file has
     Mesh mesh;
-    std::vector<vec3> normals;      // one a vertex for the idol; else indexed by normal_of
+    std::vector<vec3> normals;
     std::vector<vec2> uvs;
-    std::vector<Face> uv_of, normal_of;  // per face, per corner
+    std::vector<Face> uv_of, normal_of;  // indices, three a face
 };
 
 double rounded(double x, double steps) { return std::floor(x * steps + .5) / steps + 0.; }  // + 0. turns -0 into 0
@@ -856,7 +912,8 @@ void cover(const std::array<vec2, 3>& t, double margin, const F& visit) {
         lo[k] = std::floor(std::min(t[0][k], std::min(t[1][k], t[2][k])) - margin);
         hi[k] = std::ceil(std::max(t[0][k], std::max(t[1][k], t[2][k])) + margin);
     }
-    const double area = (t[1].x - t[0].x) * (t[2].y - t[0].y) - (t[1].y - t[0].y) * (t[2].x - t[0].x), sign = area < 0 ? -1 : 1;
+    const double area = (t[1].x - t[0].x) * (t[2].y - t[0].y) - (t[1].y - t[0].y) * (t[2].x - t[0].x),
+                 sign = area < 0 ? -1 : 1;
     for (int y = static_cast<int>(lo[1]); y < static_cast<int>(hi[1]); y++)
         for (int x = static_cast<int>(lo[0]); x < static_cast<int>(hi[0]); x++) {
             bool inside = true;
@@ -870,16 +927,17 @@ void cover(const std::array<vec2, 3>& t, double margin, const F& visit) {
 
 struct Chart {
     std::vector<int> faces;
-    vec3 u, v, w;                      // an orthonormal frame: the chart is the projection along w
+    vec3 u, v, w;                               // an orthonormal frame: the chart is the projection along w
+    double shrink = 1;                          // its scale, relative to the atlas's
     int x0 = 0, y0 = 0, width = 0, height = 0;  // its box in blocks; x0, y0: in the chart's own coordinates
-    std::vector<std::vector<bool>> mask;       // blocks it needs, padding included
-    int at_x = 0, at_y = 0;            // its place in the atlas, in blocks
+    std::vector<std::vector<bool>> mask;        // blocks it needs, padding included
+    int at_x = 0, at_y = 0;                     // its place in the atlas, in blocks
 };
 
-vec2 flat(const Chart& c, const vec3& p, double scale) { return {dot(p, c.u) * scale, dot(p, c.v) * scale}; }
+vec2 flat(const Chart& c, const vec3& p, double scale) { return vec2{dot(p, c.u), dot(p, c.v)} * (scale * c.shrink); }
 
-// Charts grow from a seed over faces that look roughly the same way, and stop where the projection would fold over itself.
-// SCALE is in texels per unit of length.
+// Charts grow from a seed over faces that look roughly the same way, and stop where the projection would fold over
+// itself. SCALE is in texels per unit of length.
 std::vector<Chart> cut(const Mesh& m, double scale) {
     std::map<std::pair<int, int>, int> owner;
     for (int f = 0; f < static_cast<int>(m.faces.size()); f++)
@@ -896,14 +954,13 @@ std::vector<Chart> cut(const Mesh& m, double scale) {
     std::vector<int> chart_of(m.faces.size(), -1);
     std::vector<Chart> charts;
 
-    // Grows one chart from SEED; with a direction of its own, or the mean normal of a first growth.
+    // Grows one chart from SEED over the faces whose normals have at least the cosine LEAST with its direction W.
     const auto grow = [&](int seed, const vec3& w, double least) {
         Chart c;
         c.w = w;
         c.u = normalized(cross(std::fabs(w.y) < .8 ? vec3{0, 1, 0} : vec3{0, 0, 1}, w));
         c.v = cross(w, c.u);
         std::map<std::pair<int, int>, double> heights;  // texel -> where the surface is above it
-        std::vector<int> tried;
         using Entry = std::pair<double, int>;
         std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> open;
         open.push({0, seed});
@@ -946,13 +1003,15 @@ std::vector<Chart> cut(const Mesh& m, double scale) {
             if (dot(mean, normal[at(seed)]) < .62) break;
             c = grow(seed, mean, .6);
         }
+        if (middle[at(seed)].y < -.95 && c.w.y < -.99) c.shrink = .25;  // under the pedestal: nobody looks there
         for (const int f : c.faces) chart_of[at(f)] = static_cast<int>(charts.size());
         charts.push_back(std::move(c));
     }
     return charts;
 }
 
-// Places the charts in a square of SIZE texels, first fit, large ones first. Returns whether they all fit at this scale.
+// Places the charts in a square of SIZE texels, first fit, large ones first. Returns whether they all fit at this
+// scale.
 constexpr int block_texels = 2;
 bool pack(const Mesh& m, std::vector<Chart>& charts, double scale, int size) {
     constexpr double padding = 2.5;  // texels around every chart that hold what lies just outside
@@ -967,13 +1026,16 @@ bool pack(const Mesh& m, std::vector<Chart>& charts, double scale, int size) {
                     const double s = flat(c, m.verts[at(v)], scale)[k];
                     lo[k] = std::min(lo[k], s), hi[k] = std::max(hi[k], s);
                 }
-        c.x0 = static_cast<int>(std::floor((lo[0] - padding) / block_texels)), c.y0 = static_cast<int>(std::floor((lo[1] - padding) / block_texels));
+        c.x0 = static_cast<int>(std::floor((lo[0] - padding) / block_texels)),
+        c.y0 = static_cast<int>(std::floor((lo[1] - padding) / block_texels));
         c.width = static_cast<int>(std::ceil((hi[0] + padding) / block_texels)) - c.x0;
         c.height = static_cast<int>(std::ceil((hi[1] + padding) / block_texels)) - c.y0;
         c.mask.assign(at(c.height), std::vector<bool>(at(c.width)));
         for (const int f : c.faces) {
             std::array<vec2, 3> t;
-            for (int k = 0; k < 3; k++) t[at(k)] = flat(c, m.verts[at(m.faces[at(f)][at(k)])], scale) - vec2{1. * c.x0 * block_texels, 1. * c.y0 * block_texels};
+            for (int k = 0; k < 3; k++)
+                t[at(k)] = flat(c, m.verts[at(m.faces[at(f)][at(k)])], scale) -
+                           vec2{1. * c.x0 * block_texels, 1. * c.y0 * block_texels};
             cover(t, padding, [&](int x, int y) {
                 const int bx = x / block_texels, by = y / block_texels;
                 if (bx >= 0 && by >= 0 && bx < c.width && by < c.height) c.mask[at(by)][at(bx)] = true;
@@ -1013,19 +1075,18 @@ bool pack(const Mesh& m, std::vector<Chart>& charts, double scale, int size) {
         if (!placed) return false;
         for (int y = 0; y < c.height; y++)
             for (int x = 0; x < c.width; x++)
-                if (c.mask[at(y)][at(x)]) used[at(c.at_y + y)][at((c.at_x + x) / 64)] |= std::uint64_t{1} << ((c.at_x + x) & 63);
+                if (c.mask[at(y)][at(x)])
+                    used[at(c.at_y + y)][at((c.at_x + x) / 64)] |= std::uint64_t{1} << ((c.at_x + x) & 63);
     }
     return true;
 }
 
-// A mesh with texture coordinates: texels are of one size everywhere, as large a scale as fits into SIZE^2 texels.
-Textured unwrap(Mesh m, int size) {
+// A mesh with texture coordinates: one scale everywhere, SCALE texels per unit of length or what fits into SIZE^2
+// texels.
+Textured unwrap(Mesh m, int size, double scale) {
     Textured out;
-    double area = 0;
     for (vec3& v : m.verts) v = rounded(v, 1e5);
-    for (const Face& f : m.faces) area += norm(face_cross(m, f)) / 2;
-    double scale = .97 * size / std::sqrt(area);
-    std::vector<Chart> charts = cut(m, scale * .85);
+    std::vector<Chart> charts = cut(m, scale);
     while (!pack(m, charts, scale, size)) scale *= .98;
     std::printf("  %zu charts, %.0f texels per unit\n", charts.size(), scale);
     out.uv_of.resize(m.faces.size());
@@ -1036,7 +1097,8 @@ Textured unwrap(Mesh m, int size) {
                 const int v = m.faces[at(f)][at(k)];
                 const auto [found, fresh] = uv_of_vertex.insert({v, static_cast<int>(out.uvs.size())});
                 if (fresh) {
-                    const vec2 t = flat(c, m.verts[at(v)], scale) + vec2{1. * (c.at_x - c.x0) * block_texels, 1. * (c.at_y - c.y0) * block_texels};
+                    const vec2 t = flat(c, m.verts[at(v)], scale) +
+                                   vec2{1. * (c.at_x - c.x0) * block_texels, 1. * (c.at_y - c.y0) * block_texels};
                     out.uvs.push_back({rounded(t.x / size, 1e5), rounded(t.y / size, 1e5)});
                 }
                 out.uv_of[at(f)][at(k)] = found->second;
@@ -1050,7 +1112,8 @@ Textured unwrap(Mesh m, int size) {
 
 // ---- bake: from the surface to the texels ----
 
-// The face that each texel belongs to, -1 where there is none; four texels around every chart belong to the nearest one.
+// The face that each texel belongs to, -1 where there is none; three texels around every chart belong to a face beside
+// them.
 std::vector<int> owners(const Textured& t, int size) {
     std::vector<int> owner(at(size) * at(size), -1);
     const auto texel = [&](int x, int y) -> int& { return owner[at(y) * at(size) + at(x)]; };
@@ -1082,8 +1145,8 @@ std::array<double, 3> barycentric(const std::array<vec2, 3>& t, const vec2& p) {
     return {1 - b - c, b, c};
 }
 
-// The normal N in the frame that the renderer builds from the triangle: columns i, j (along the gradients of u and v in the
-// plane orthogonal to the interpolated normal) and that normal. The columns i and j need not be orthogonal.
+// The normal N in the frame that the renderer builds from the triangle: columns i, j (along the gradients of u and v in
+// the plane orthogonal to the interpolated normal) and that normal. The columns i and j need not be orthogonal.
 vec3 to_tangent(const std::array<vec3, 3>& p, const std::array<vec2, 3>& uv, const vec3& interpolated, const vec3& n) {
     const vec3 e1 = p[1] - p[0], e2 = p[2] - p[0], c1 = cross(e2, interpolated), c2 = cross(interpolated, e1);
     const double sign = dot(e1, c1) < 0 ? -1 : 1;
@@ -1097,69 +1160,93 @@ std::uint8_t byte(double x) { return static_cast<std::uint8_t>(std::floor(clamp0
 TGAColor colour(const vec3& c) { return {{byte(c.z), byte(c.y), byte(c.x), 255}}; }
 TGAColor encoded(const vec3& n) { return colour((n + vec3{1, 1, 1}) / 2); }
 
-struct Maps { TGAImage diffuse, normal, tangent, specular, glow; };
+struct Maps {
+    TGAImage diffuse, normal, tangent, specular, glow;
+};
+
+// The picture at half its size: each pixel is the mean of those of its four that are not 0 (0: no face there).
+TGAImage halved(const TGAImage& image) {
+    TGAImage out(image.width() / 2, image.height() / 2, TGAImage::GRAYSCALE);
+    for (int y = 0; y < out.height(); y++)
+        for (int x = 0; x < out.width(); x++) {
+            int sum = 0, count = 0;
+            for (int k = 0; k < 4; k++) {
+                const int value = image.get(2 * x + k % 2, 2 * y + k / 2)[0];
+                sum += value, count += value > 0;
+            }
+            if (count) out.set(x, y, {{static_cast<std::uint8_t>((sum + count / 2) / count), 0, 0, 0}});
+        }
+    return out;
+}
 
 Maps bake_idol(const Textured& t, int size) {
     const std::vector<int> owner = owners(t, size);
-    Maps out{{size, size, TGAImage::RGB}, {size, size, TGAImage::RGB}, {size, size, TGAImage::RGB},
-             {size, size, TGAImage::GRAYSCALE}, {size, size, TGAImage::RGB}};
+    Maps out{{size, size, TGAImage::RGB},
+             {size, size, TGAImage::RGB},
+             {size, size, TGAImage::RGB},
+             {size, size, TGAImage::GRAYSCALE},
+             {size, size, TGAImage::RGB}};
     parallel(size, [&](int y) {
         for (int x = 0; x < size; x++) {
             const int f = owner[at(y) * at(size) + at(x)];
             if (f < 0) continue;
             std::array<vec3, 3> p;
             std::array<vec2, 3> uv;
-            for (int k = 0; k < 3; k++) p[at(k)] = t.mesh.verts[at(t.mesh.faces[at(f)][at(k)])], uv[at(k)] = t.uvs[at(t.uv_of[at(f)][at(k)])];
+            for (int k = 0; k < 3; k++)
+                p[at(k)] = t.mesh.verts[at(t.mesh.faces[at(f)][at(k)])], uv[at(k)] = t.uvs[at(t.uv_of[at(f)][at(k)])];
             const auto b = barycentric(uv, vec2{(x + .5) / size, (y + .5) / size});
             vec3 place, n;
-            for (int k = 0; k < 3; k++) place = place + p[at(k)] * b[at(k)], n = n + t.normals[at(t.normal_of[at(f)][at(k)])] * b[at(k)];
+            for (int k = 0; k < 3; k++)
+                place = place + p[at(k)] * b[at(k)], n = n + t.normals[at(t.normal_of[at(f)][at(k)])] * b[at(k)];
             const Surface s = surface(onto_surface(place));
             out.diffuse.set(x, y, colour(s.diffuse));
             out.normal.set(x, y, encoded(s.normal));
             out.tangent.set(x, y, encoded(to_tangent(p, uv, normalized(n), s.normal)));
-            out.specular.set(x, y, {{static_cast<std::uint8_t>(std::min(255., std::max(1., std::floor(s.exponent + .5)))), 0, 0, 0}});
+            out.specular.set(
+                x, y,
+                {{static_cast<std::uint8_t>(std::min(255., std::max(1., std::floor(s.exponent + .5)))), 0, 0, 0}});
             out.glow.set(x, y, colour(s.glow));
         }
     });
+    out.specular = halved(out.specular);  // it varies slowly
     return out;
 }
 
 // ---- the floor: a slab of worn flagstones under the idol, with a ring of gold let in ----
 
-constexpr double floor_top = -.935, floor_bottom = -.99, floor_half = .99;
+constexpr double floor_top = -.95, floor_bottom = -.995, floor_half = .99;
 constexpr int floor_cells = 20;
 
-// The texture is the slab unfolded: the top in the middle, the sides around it. FLOOR_UV units of length make up one side.
+// The texture is the slab unfolded: the top in the middle, the sides around it. FLOOR_UV units of length make up one
+// side.
 constexpr double floor_uv = 2 * (floor_half + floor_top - floor_bottom);
 
-struct Flag { double height, seam, shade; vec3 tint; double gold; };
+struct Flag {
+    double height, seam, gold;  // seam, gold: 1 in the mortar, 1 on the ring
+    vec3 tint;
+};
 
 Flag flagstone(double x, double z) {
-    const double r = std::sqrt(x * x + z * z), wobble = .004 * noise(vec3{x * 30, z * 30, 1});
-    Flag out{};
-    double cell_x, cell_y, edge;
-    int i, j;
-    if (r > .86 && r < .93) {  // the ring
-        out.gold = smoothstep(.86, .868, r) * (1 - smoothstep(.922, .93, r));
-    }
-    const double row = z / .22 + 40, k = std::floor(row);
-    const double column = x / .33 + .37 * k + 40;
-    cell_x = column - std::floor(column), cell_y = row - k;
-    i = static_cast<int>(std::floor(column)), j = static_cast<int>(k);
-    edge = std::min(std::min(cell_x, 1 - cell_x) * .33, std::min(cell_y, 1 - cell_y) * .22) + wobble;
+    constexpr double length = .33, width = .22;
+    const double row = z / width + 40, j = std::floor(row), column = x / length + .37 * j + 40, i = std::floor(column);
+    const double in_x = column - i, in_z = row - j, wobble = .004 * noise(vec3{x * 30, z * 30, 1});
+    const double edge = std::min(std::min(in_x, 1 - in_x) * length, std::min(in_z, 1 - in_z) * width) + wobble;
+    const auto chance = [&](int k) { return hash01(static_cast<int>(i), static_cast<int>(j), k); };  // one a stone
+    const double bumps = .5 * fbm(vec3{x * 16, z * 16, 3 + i}, 4) + .25 * noise(vec3{x * 70, z * 70, 9});
+    Flag out;
     out.seam = 1 - smoothstep(.004, .014, edge);
-    out.shade = hash01(i, j, 5);
-    const double bumps = .5 * fbm(vec3{x * 16, z * 16, 3. + i}, 4) + .25 * noise(vec3{x * 70, z * 70, 9});
-    out.height = .010 * smoothstep(.002, .02, edge) + .005 * bumps + .006 * (hash01(i, j, 8) - .5) * (cell_x - .5) * (1 - out.seam);
-    out.tint = mix({.40, .37, .36}, {.52, .44, .36}, hash01(i, j, 2)) * (.75 + .35 * out.shade + .35 * bumps);
+    out.height =
+        .010 * smoothstep(.002, .02, edge) + .005 * bumps + .006 * (chance(8) - .5) * (in_x - .5) * (1 - out.seam);
+    out.tint = mix({.40, .37, .36}, {.52, .44, .36}, chance(2)) * (.75 + .35 * chance(5) + .35 * bumps);
     out.tint = mix(out.tint, {.12, .10, .09}, .85 * out.seam);
-    if (out.gold > 0) {
-        const double turn = atan_turns(z, x) * 96, f = turn - std::floor(turn);
-        const double plate = smoothstep(.04, .12, f) * (1 - smoothstep(.88, .96, f));
-        out.height = mix(out.height, .008 + .003 * plate * out.gold, out.gold);
-        out.tint = mix(out.tint, vec3{.80, .55, .20} * (.45 + .5 * plate + .25 * noise(vec3{x * 25, z * 25, 4})), out.gold);
-        out.seam *= 1 - out.gold;
-    }
+
+    const double r = std::sqrt(x * x + z * z), turn = atan_turns(z, x) * 96, f = turn - std::floor(turn);
+    const double plate = smoothstep(.04, .12, f) * (1 - smoothstep(.88, .96, f));
+    const vec3 brass = vec3{.80, .55, .20} * (.45 + .5 * plate + .25 * noise(vec3{x * 25, z * 25, 4}));
+    out.gold = smoothstep(.86, .868, r) * (1 - smoothstep(.922, .93, r));
+    out.height = mix(out.height, .008 + .003 * plate * out.gold, out.gold);
+    out.tint = mix(out.tint, brass, out.gold);
+    out.seam *= 1 - out.gold;
     return out;
 }
 
@@ -1173,7 +1260,9 @@ Textured floor_mesh() {
     const auto corner = [&](const std::array<int, 3>& c) {
         const auto [found, fresh] = index.insert({c, static_cast<int>(out.mesh.verts.size())});
         if (fresh)
-            out.mesh.verts.push_back(rounded({(2. * c[0] / n - 1) * floor_half, c[1] ? floor_top : floor_bottom, (2. * c[2] / n - 1) * floor_half}, 1e5));
+            out.mesh.verts.push_back(rounded(
+                {(2. * c[0] / n - 1) * floor_half, c[1] ? floor_top : floor_bottom, (2. * c[2] / n - 1) * floor_half},
+                1e5));
         return found->second;
     };
     const auto quad = [&](const std::array<std::array<int, 3>, 4>& c, int normal) {  // counter-clockwise
@@ -1205,8 +1294,8 @@ Textured floor_mesh() {
     return out;
 }
 
-// u runs along x and v along -z; on the sides the texture goes on as if the slab were unfolded. Bump mapping (Blinn 1978):
-// the normal of a height field h over (u,v) is (-dh/du, -dh/dv, 1).
+// u runs along x and v along -z; on the sides the texture goes on as if the slab were unfolded. Bump mapping (Blinn
+// 1978): the normal of a height field h over (u,v) is (-dh/du, -dh/dv, 1).
 Maps bake_floor(int size) {
     Maps out{{size, size, TGAImage::RGB}, {}, {size, size, TGAImage::RGB}, {size, size, TGAImage::GRAYSCALE}, {}};
     parallel(size, [&](int y) {
@@ -1217,7 +1306,8 @@ Maps bake_floor(int size) {
             const double hv = (flagstone(px, pz - e).height - flagstone(px, pz + e).height) / (2 * e);
             out.diffuse.set(x, y, colour(f.tint));
             out.tangent.set(x, y, encoded(normalized(vec3{-hu, -hv, 1})));
-            out.specular.set(x, y, {{static_cast<std::uint8_t>(f.gold > .5 ? 20 : 40 + std::floor(60 * f.seam)), 0, 0, 0}});
+            out.specular.set(x, y,
+                             {{static_cast<std::uint8_t>(f.gold > .5 ? 20 : 40 + std::floor(60 * f.seam)), 0, 0, 0}});
         }
     });
     return out;
@@ -1227,7 +1317,7 @@ Maps bake_floor(int size) {
 
 Mesh knot_mesh() {
     constexpr int along = 240, around = 18, p = 2, q = 3;
-    constexpr double major = .56, minor = .24, tube = .135;
+    constexpr double major = .61, minor = .24, tube = .135;
     Mesh out;
     const auto curve = [](double t) {
         const double r = major + minor * cos_turns(q * t);
@@ -1236,7 +1326,8 @@ Mesh knot_mesh() {
     for (int i = 0; i < along; i++) {
         const double t = 1. * i / along;
         const vec3 c = curve(t), tangent = normalized(curve(t + 1e-3) - curve(t - 1e-3));
-        const vec3 outward = vec3{cos_turns(p * t) * cos_turns(q * t), sin_turns(p * t) * cos_turns(q * t), sin_turns(q * t)};  // the torus's normal
+        const vec3 outward = vec3{cos_turns(p * t) * cos_turns(q * t), sin_turns(p * t) * cos_turns(q * t),
+                                  sin_turns(q * t)};  // the torus's normal
         const vec3 b = normalized(cross(tangent, outward)), a = cross(b, tangent);
         for (int k = 0; k < around; k++) {
             const double s = 1. * k / around;
@@ -1306,7 +1397,8 @@ int main(int argc, char** argv) {
         for (const char* name : {"idol", "floor", "knot"}) std::filesystem::create_directories(folder / name);
 
         const Mesh net = surface_net(176);
-        const Textured idol_mesh = unwrap(simplify(net, 16000), 1024);
+        // 300 texels per unit: a texel is as large as a pixel of the default picture
+        const Textured idol_mesh = unwrap(simplify(net, 16000), 1024, 300);
         check_closed(idol_mesh.mesh, "idol", 2);
         write_obj(folder / "idol" / "idol.obj", idol_mesh, "The idol: a horned bust");
         write_maps(folder / "idol" / "idol", bake_idol(idol_mesh, 1024));
