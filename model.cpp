@@ -455,7 +455,7 @@ private:
     void use_material() {
         const int name = obj_.materials.id(in_.rest()), face = to_int(obj_.corners.size() / 3);
         if (obj_.runs.back().face == face) obj_.runs.back().name = name;
-        else if (obj_.runs.back().name != name) obj_.runs.push_back({face, name});
+        else obj_.runs.push_back({face, name});
     }
 
     TextFile in_;
@@ -488,8 +488,8 @@ double area2(const vec2& a, const vec2& b, const vec2& c) {
 //
 // The reflex corners are kept in a k-d tree, so a test usually looks at some ten to a hundred nodes instead of all
 // corners: 100 000 corners take a tenth of a second. Where it does not (a fine staircase askew to the axes is the worst
-// case known), the work is bounded all the same: a model has 2^28 nodes (seconds) and 100 per corner; what is left then
-// becomes a fan.
+// case known), the work is bounded all the same: a model has 2^27 nodes (a second or two) and 100 per corner; what is
+// left then becomes a fan.
 class PolygonCutter {
 public:
     // FAN holds the polygon (c0, c1, c2, ...) as the triangles (c0,c1,c2), (c0,c2,c3), ... and receives the triangles.
@@ -510,7 +510,7 @@ private:
         const auto vert = [&](std::size_t i) { return verts[to_size(corners_[i].vert)]; };
         double extent = 0;
         for (std::size_t i = 0; i < corners_.size(); i++) extent = std::max(extent, largest(vert(i)));
-        const int e = is_moderate(extent) ? 0 : extent > 0 ? std::ilogb(extent) : 0;
+        const int e = extent < 1e100 ? 0 : std::ilogb(extent);  // else differences may overflow
         const vec3 origin = scaled(vert(0), e);
         relative_.clear();
         double span = 0;
@@ -573,18 +573,11 @@ private:
             *out++ = corners_[to_size(c)];
         };
         int left = n, some = 0;
-        bool touching_allowed = false;
         while (left > 3 && work_ > 0) {
             const int v = dequeue();
-            if (v < 0) {  // no ear: next, corners that only touch an ear's edge do not count
-                if (touching_allowed) break;
-                touching_allowed = true;
-                for (int i = 0, j = some; i < left; i++, j = next_[to_size(j)]) enqueue(j);
-                work_ -= left;
-                continue;
-            }
+            if (v < 0) break;  // no ear: it crosses itself
             work_--;
-            if (!alive_[to_size(v)] || !is_ear(v, touching_allowed)) continue;
+            if (!alive_[to_size(v)] || !is_ear(v)) continue;
             const int u = previous_[to_size(v)], w = next_[to_size(v)];
             emit(u, v, w);
             alive_[to_size(v)] = 0;
@@ -592,7 +585,6 @@ private:
             previous_[to_size(w)] = u;
             some = w;
             left--;
-            touching_allowed = false;
             if (reflex_[to_size(v)]) remove_from_tree(v);
             for (const int neighbour : {u, w}) {
                 if (reflex_[to_size(neighbour)] && turn(neighbour) > 0) remove_from_tree(neighbour);
@@ -615,13 +607,12 @@ private:
         return turn(v) == 0 &&
                dot(points_[to_size(previous_[to_size(v)])] - p, points_[to_size(next_[to_size(v)])] - p) >= 0;
     }
-    bool is_ear(int v, bool touching_allowed) {
+    bool is_ear(int v) {
         if (!(turn(v) > 0)) return is_spike(v);
         triangle_ = {points_[to_size(previous_[to_size(v)])], points_[to_size(v)], points_[to_size(next_[to_size(v)])]};
         const auto& [a, b, c] = triangle_;
         low_ = {std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y})};
         high_ = {std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y})};
-        touching_allowed_ = touching_allowed;
         return !is_any_inside(0, to_int(tree_.size()));
     }
 
@@ -698,8 +689,7 @@ private:
         for (std::size_t i = 0; i < 3; i++) {
             const vec2 &a = triangle_[i], &b = triangle_[(i + 1) % 3];
             const vec2 innermost{b.y > a.y ? node.low.x : node.high.x, b.x > a.x ? node.high.y : node.low.y};
-            const double inside = area2(a, b, innermost);
-            if (touching_allowed_ ? inside <= 0 : inside < 0) return false;
+            if (area2(a, b, innermost) < 0) return false;
         }
         return (reflex_[to_size(node.corner)] && blocks(node.point)) || is_any_inside(low, middle) ||
                is_any_inside(middle + 1, high);
@@ -707,8 +697,7 @@ private:
     bool blocks(const vec2& p) const {  // a corner of the triangle itself does not, nor one at the same place
         const auto& [a, b, c] = triangle_;
         if (p == a || p == b || p == c) return false;
-        const double ab = area2(a, b, p), bc = area2(b, c, p), ca = area2(c, a, p);
-        return touching_allowed_ ? ab > 0 && bc > 0 && ca > 0 : ab >= 0 && bc >= 0 && ca >= 0;
+        return area2(a, b, p) >= 0 && area2(b, c, p) >= 0 && area2(c, a, p) >= 0;
     }
 
     std::vector<Corner> corners_;
@@ -718,10 +707,9 @@ private:
     std::vector<int> previous_, next_, spikes_, queue_, place_;  // place_: where in the tree a reflex corner is
     std::vector<char> reflex_, queued_, alive_;
     std::size_t queue_head_ = 0;
-    std::array<vec2, 3> triangle_;  // of the ear in question
-    vec2 low_, high_;               // its box
-    bool touching_allowed_ = false;
-    std::int64_t work_ = std::int64_t{1} << 28;  // nodes that may still be looked at
+    std::array<vec2, 3> triangle_;               // of the ear in question
+    vec2 low_, high_;                            // its box
+    std::int64_t work_ = std::int64_t{1} << 27;  // nodes that may still be looked at
 };
 
 // ---- normals where the file gives none ----

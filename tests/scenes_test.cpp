@@ -268,14 +268,15 @@ SCENE(edge_rule) {
     return folder.frame("--size 96x96 --shadow off --no-fit --eye 0,0,4 --light 0,0,1 grid.obj");
 }
 
-// One quad from far in front of the eye to far behind it. The eye is close to it: the lowest pixels show what is a tenth
-// of the way to the centre.
+// One quad from far in front of the eye to far behind it, just below the eye: the lowest pixels show what is a tenth of
+// the way to the centre.
 SCENE(near_plane) {
     Obj obj;
     obj.quad({-8, -.5, 10}, {8, -.5, 10}, {8, -.5, -10}, {-8, -.5, -10}, {0, 0}, {32, 40});
     folder.write("floor.obj", obj.text());
     folder.write("floor_diffuse.tga", checkers(2, 4));
-    return folder.frame("--size 128x96 --shadow off --no-fit --eye .3,-.36,2 --center 0,-.5,0 --light .3,1,.5 floor.obj");
+    return folder.frame("--size 128x96 --shadow off --no-fit --eye .3,-.36,2 --center 0,-.5,0 "
+                        "--light .3,1,.5 floor.obj");
 }
 
 // Six triangles a million pixels large meet in the middle. In front of them is a small hexagon in lighter and darker
@@ -413,7 +414,7 @@ SCENE(center_and_up) {
                         "card.obj");
 }
 
-// The yard, 40 times as large and far away from the origin: it is fitted, and looks like shadow_map.
+// The yard, 40 times as large and far away from the origin: it is fitted, and looks like no_textures.
 SCENE(fitted) {
     Obj obj;
     obj.place({1000, -2000, 1500}, 40);
@@ -572,6 +573,7 @@ SCENE(no_textures) {
     folder.write("yard.obj", yard());
     return folder.frame("--size 128x128 --shadow-size 512 --eye 1,1.8,5 --light 1,1,.6 yard.obj");
 }
+
 // The same without shadows.
 SCENE(shadow_off) {
     folder.write("yard.obj", yard());
@@ -649,7 +651,7 @@ SCENE(two_models) {
     return folder.frame("--size 128x128 --shadow-size 512 --eye .5,3,4 --light .7,1,-.3 red.obj blue.obj");
 }
 
-// What the light sees of them: near is white. The light's camera has up upwards too.
+// What the light sees of them: near is white.
 SCENE(two_models_depth) {
     add_two_models(folder);
     return folder.depth("--size 16x16 --shadow-size 128 --eye .5,3,4 --light .7,1,-.3 red.obj blue.obj");
