@@ -23,7 +23,7 @@ umbra_mutant(mutant_half_bias
   "p.z + .5 * dot(g, to_centre) + rounding")
 umbra_mutant(mutant_no_caster_slope
   "stored - (slope_x + slope_y) / 2 > p.z"
-  "stored > p.z")
+  "stored - 0 * (slope_x + slope_y) > p.z")
 umbra_mutant(mutant_loose_fit
   "Camera light = fitted_camera(scene.models, opt.light, opt.up, size)"
   "Camera light{lookat(opt.light, {}, opt.up), projection(0), middle_viewport(size, size)}")

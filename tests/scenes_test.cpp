@@ -94,7 +94,7 @@ public:
     // A polygon with vertices of its own, hence with its own normal; counter-clockwise where its front is seen.
     void polygon(const std::vector<vec3>& corners) {
         std::string f = "f";
-        for (const vec3& p : corners) f += " " + std::to_string(vertex(p));
+        for (const vec3& p : corners) f.append(" ").append(std::to_string(vertex(p)));
         text_ << f << '\n';
     }
     // A quadrangle whose texture coordinates run from LOW at its first corner to HIGH at its third, the opposite one.
@@ -105,7 +105,7 @@ public:
         std::string f = "f";
         for (int i = 0; i < 4; i++) {
             const int v = vertex(corners[i]), t = uv(uvs[i]);
-            f += " " + std::to_string(v) + "/" + std::to_string(t);
+            f.append(" ").append(std::to_string(v)).append("/").append(std::to_string(t));
         }
         text_ << f << '\n';
     }
@@ -114,7 +114,7 @@ public:
         std::string f = "f";
         for (std::size_t i = 0; i < 4; i++) {
             const int v = vertex(corners[i]), n = normal(normals[i]);
-            f += " " + std::to_string(v) + "//" + std::to_string(n);
+            f.append(" ").append(std::to_string(v)).append("//").append(std::to_string(n));
         }
         text_ << f << '\n';
     }
