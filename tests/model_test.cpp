@@ -55,7 +55,8 @@ std::string faces(const Model& m) {
     for (int f = 0; f < m.nfaces(); f++)
         for (int c = 0; c < 3; c++) {
             const Model::Corner& k = m.corner(f, c);
-            out += (c ? " " : f ? ", " : "") + std::to_string(k.vert) + (k.uv < 0 ? "" : "/" + std::to_string(k.uv));
+            out.append(c ? " " : f ? ", " : "").append(std::to_string(k.vert));
+            if (k.uv >= 0) out.append("/").append(std::to_string(k.uv));
         }
     return out;
 }
@@ -200,8 +201,8 @@ TEST("lines of all lengths, over many reads of the file") {
     for (int i = 0; i < n; i++) {
         const char* const end = i % 3 == 0 ? "\r\n" : "\n";
         obj += "v " + std::to_string(i) + (i % 5 == 0 ? "\\\n " : " ") + std::to_string(i + 1) + " 0" + end;
-        if (random() % 4 == 0) obj += "#" + std::string(random() % 400, '.') + (i % 7 == 0 ? "\\" : "") + end;
-        if (random() % 4 == 0) obj += std::string(random() % 100, ' ') + end;
+        if (random() % 4 == 0) obj.append("#").append(random() % 400, '.').append(i % 7 == 0 ? "\\" : "").append(end);
+        if (random() % 4 == 0) obj.append(random() % 100, ' ').append(end);
     }
     const auto lines = std::count(obj.begin(), obj.end(), '\n');
     const Model m = load(obj + "f 1 2 3");
@@ -284,7 +285,7 @@ TEST("numbers are read as strtod reads them, to the last bit") {
         for (auto n = random() % 12; n-- > 0;) s += static_cast<char>('0' + random() % 10);
         s += '.';
         for (auto n = 1 + random() % 12; n-- > 0;) s += static_cast<char>('0' + random() % 10);
-        if (random() % 4 == 0) s += "e" + std::to_string(static_cast<int>(random() % 560) - 280);
+        if (random() % 4 == 0) s.append("e").append(std::to_string(static_cast<int>(random() % 560) - 280));
         numbers.push_back(s);
     }
     std::string obj;
@@ -422,7 +423,7 @@ std::string in_plane(const Polygon& p, const vec3& right = {1, 0, 0}, const vec3
         obj += line;
     }
     obj += "f";
-    for (std::size_t i = 1; i <= p.size(); i++) obj += " " + std::to_string(i);
+    for (std::size_t i = 1; i <= p.size(); i++) obj.append(" ").append(std::to_string(i));
     return obj + "\n";
 }
 
@@ -1234,7 +1235,8 @@ TEST("random bytes give a model or an error, never a crash") {
             }
         for (int k = 0; k < 8; k++) {
             obj += "f";
-            for (auto corners = 3 + random() % 8; corners-- > 0;) obj += " " + std::to_string(1 + random() % 12);
+            for (auto corners = 3 + random() % 8; corners-- > 0;)
+                obj.append(" ").append(std::to_string(1 + random() % 12));
             obj += "\n";
         }
         loaded += survives(folder.write("m.obj", obj));
