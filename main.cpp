@@ -65,8 +65,7 @@ struct Receiver {
     }
 };
 
-// --shadow off
-struct NoShadow {
+struct NoShadow {  // --shadow off
     void vertex(int, int, const vec3&) {}
     bool lit(const Fragment&) const { return true; }
 };
@@ -100,11 +99,13 @@ struct ShadowMap : Receiver {
         const vec2 g = slope(), to_centre{std::floor(p.x) + .5 - p.x, std::floor(p.y) + .5 - p.y};
         const double rounding = depth_rounding + (std::fabs(g.x) + std::fabs(g.y)) / (1 << TriangleSetup::subpixel_bits);
         if (!(stored > p.z + dot(g, to_centre) + rounding)) return true;
-        // What is above it there may be lower here, up to half a texel away. Its slope is that towards the nearer in depth
-        // of the two neighbours, since the other may belong to something else.
-        const double slope_x = std::min(std::fabs(stored - depth(-1, 0)), std::fabs(stored - depth(1, 0)));
-        const double slope_y = std::min(std::fabs(stored - depth(0, -1)), std::fabs(stored - depth(0, 1)));
-        return !(stored - (slope_x + slope_y) / 2 > p.z + rounding);
+        // What is above it there may be lower here: between centres the buffer knows nothing, so it may be as low as the
+        // next texel. Of an axis' two neighbours the nearer in depth counts, since the other may belong to something else;
+        // where both are lower, on a thin caster, half the way down is as far as the fragment can be.
+        const auto fall = [&](double a, double b) {
+            return std::min(std::fabs(stored - a), std::fabs(stored - b)) / (a < stored && b < stored ? 2 : 1);
+        };
+        return !(stored - fall(depth(-1, 0), depth(1, 0)) - fall(depth(0, -1), depth(0, 1)) > p.z + rounding);
     }
 };
 

@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
         std::string model;
         double dark, lit;
     };
-    for (const Figures& f : {Figures{"knot", .1102, .0782}, Figures{"idol", .3658, .3193}}) {
+    for (const Figures& f : {Figures{"knot", .0716, .0847}, Figures{"idol", .2553, .3589}}) {
         const auto map = report(folder, obj + "/" + f.model + "/" + f.model + ".obj");
         hold(f.model + ", map", map, "coverage", 5);
         hold(f.model + ", map", map, "self", 0);

@@ -22,8 +22,8 @@ umbra_mutant(mutant_half_bias
   "p.z + dot(g, to_centre) + rounding"
   "p.z + .5 * dot(g, to_centre) + rounding")
 umbra_mutant(mutant_no_caster_slope
-  "stored - (slope_x + slope_y) / 2 > p.z"
-  "stored - 0 * (slope_x + slope_y) > p.z")
+  "/ (a < stored && b < stored ? 2 : 1)"
+  "* 0")
 umbra_mutant(mutant_loose_fit
   "Camera light = fitted_camera(scene.models, opt.light, opt.up, size)"
   "Camera light{lookat(opt.light, {}, opt.up), projection(0), middle_viewport(size, size)}")

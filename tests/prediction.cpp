@@ -1,12 +1,13 @@
 // prediction.cpp: needles thrown over the surface.
 #include "prediction.h"
-#include "our_gl.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <thread>
+
+#include "our_gl.h"
 
 namespace {
 
@@ -73,8 +74,8 @@ struct NeedleEnd {
     vec3 weight;
 };
 
-NeedleEnd walk(const RayCaster& caster, const Neighbours& neighbours, const LightFrame& light, int face, const vec2& start,
-               const vec2& goal, const vec3& to_light) {
+NeedleEnd walk(const RayCaster& caster, const Neighbours& neighbours, const LightFrame& light, int face,
+               const vec2& start, const vec2& goal, const vec3& to_light) {
     NeedleEnd end{face, {}};
     int came_over = -1;
     // A straight line meets a convex face once: more steps than faces would be rounding's doing.
@@ -91,9 +92,11 @@ NeedleEnd walk(const RayCaster& caster, const Neighbours& neighbours, const Ligh
             if (at < leave_at) leave_over = i, leave_at = at;
         }
         if (leave_over < 0) return end;
-        const vec3 &a = t[static_cast<std::size_t>((leave_over + 1) % 3)], &b = t[static_cast<std::size_t>((leave_over + 2) % 3)];
+        const vec3 &a = t[static_cast<std::size_t>((leave_over + 1) % 3)],
+                   &b = t[static_cast<std::size_t>((leave_over + 2) % 3)];
         const int next = neighbours.across(a, b);
-        if (next < 0 || !caster.faces(next, to_light)) return end;  // the surface ends: its plane goes on, as in a buffer
+        if (next < 0 || !caster.faces(next, to_light))
+            return end;  // the surface ends: its plane goes on, as in a buffer
         end.face = next;
         came_over = 0;
         while (caster.triangle(next)[static_cast<std::size_t>((came_over + 1) % 3)] != b) came_over++;
@@ -102,12 +105,12 @@ NeedleEnd walk(const RayCaster& caster, const Neighbours& neighbours, const Ligh
 }
 
 struct Count {
-    long facing = 0, wrong = 0;     // pixels: all, and those wrong without any needle
-    long crossings = 0, net = 0;    // needles: all that cross, and those that make wrong less those that put right
+    long facing = 0, wrong = 0;   // pixels: all, and those wrong without any needle
+    long crossings = 0, net = 0;  // needles: all that cross, and those that make wrong less those that put right
 };
 
-// Calls visit(hit, random, count) for the pixels whose surface faces the light. Rows have seeds of their own, so the result
-// does not depend on the number of threads.
+// Calls visit(hit, random, count) for the pixels whose surface faces the light. Rows have seeds of their own, so the
+// result does not depend on the number of threads.
 template <class Visit>
 Count for_each_facing(const RayCaster& caster, const View& view, const vec3& to_light, int threads, Visit visit) {
     std::vector<Count> rows(static_cast<std::size_t>(view.height));
@@ -165,8 +168,8 @@ double Theory::wrong() const { return floor + 2 / std::numbers::pi * mean_needle
 
 Theory Theory::with_texels(double factor) const { return {floor, mean_needle * factor, boundary_per_area, deviation}; }
 
-Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel, int needles,
-                            int threads) {
+Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel,
+                            int needles, int threads) {
     const LightFrame light(to_light, view.up);
     const Neighbours neighbours(caster);
     const Count count = for_each_facing(caster, view, to_light, threads, [&](const Hit& hit, Random& random, Count& c) {
@@ -182,8 +185,8 @@ Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec
     return theory(count, mean_distance(texel), needles);
 }
 
-Theory theory_of_constant_bias(const RayCaster& caster, const View& view, const vec3& to_light, double bias, const Texel& texel,
-                               int needles, int threads) {
+Theory theory_of_constant_bias(const RayCaster& caster, const View& view, const vec3& to_light, double bias,
+                               const Texel& texel, int needles, int threads) {
     const LightFrame light(to_light, view.up);
     const Count count = for_each_facing(caster, view, to_light, threads, [&](const Hit& hit, Random& random, Count& c) {
         const bool dark = caster.occluded(hit.point, light.z, bias);
@@ -195,5 +198,6 @@ Theory theory_of_constant_bias(const RayCaster& caster, const View& view, const 
             c.crossings += crosses, c.net += crosses ? (wrong ? -1 : 1) : 0;
         }
     });
-    return theory(count, 2 * mean_distance(texel), needles);  // from a corner: the mean from the centre of one twice as large
+    return theory(count, 2 * mean_distance(texel),
+                  needles);  // from a corner: the mean from the centre of one twice as large
 }

@@ -1,9 +1,10 @@
-// prediction.h: what theory says of a shadow buffer's error, before a buffer is drawn: the length of the shadow's boundary,
-// by needles, times the size of the texels. It knows the ray caster and the shape of a texel, and no shadow method's code.
+// prediction.h: what theory says of a shadow buffer's error, before a buffer is drawn: the length of the shadow's
+// boundary, by needles, times the size of the texels. It knows the ray caster and the shape of a texel, and no shadow
+// method's code.
 //
-// A buffer judges a point by a sample beside it. Where the boundary of the shadow passes between the two, the verdict is
-// wrong. So the error is the probability that a needle from a point to its sample crosses the boundary; the needle is
-// uniform over the texel, and by Crofton's formula its crossings measure the boundary's length L. With A the lit and
+// A buffer judges a point by a sample beside it. Where the boundary of the shadow passes between the two, the verdict
+// is wrong. So the error is the probability that a needle from a point to its sample crosses the boundary; the needle
+// is uniform over the texel, and by Crofton's formula its crossings measure the boundary's length L. With A the lit and
 // shadowed area, both as the light sees them, and m the needle's mean length,
 //     share of wrong pixels = floor + 2/pi * m * L/A,
 // where 2/pi is the mean of |cos| between needle and boundary. A square texel of side h read at its centre has
@@ -28,20 +29,20 @@ struct Theory {
     double boundary_per_area = 0;  // L/A, in one over the scene's unit
     double deviation = 0;          // of L/A as it was estimated, if crossings were independent
 
-    double wrong() const;                        // share of the facing pixels with these texels
-    Theory with_texels(double factor) const;     // ... with texels larger by a factor, where L/A does not depend on them
+    double wrong() const;                     // share of the facing pixels
+    Theory with_texels(double factor) const;  // the same boundary under texels larger by a factor
 };
 
-// A bias that vanishes with the texel, samples at the texels' centres: no floor. L is that of the true shadow: a needle runs
-// over the surface, from face to face as long as they face the light, and its two ends are compared. Like a coast's, this
-// length grows as needles get shorter: a lit face among dark ones where the surface turns away from the light is narrower
-// than any texel. So needles have the texel's own size.
-Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel, int needles,
-                            int threads);
+// A bias that vanishes with the texel, samples at the texels' centres: no floor. L is that of the true shadow: a needle
+// runs over the surface, from face to face as long as they face the light, and its two ends are compared. Like a
+// coast's, this length grows as needles get shorter: a lit face among dark ones where the surface turns away from the
+// light is narrower than any texel. So needles have the texel's own size.
+Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel,
+                            int needles, int threads);
 
 // A constant bias, in the scene's unit; samples at the texels' corners with the smallest x and y, as an index cut to an
-// integer finds them. The floor is what the bias leaks. The boundary is that of the shadow which the bias leaves; where the
-// bias makes a pixel wrong anyway a crossing puts it right and counts -1. The bias smooths the coast away, so one texel
-// stands for all; it must be smaller than bias / slope, or the surface is taken for its own shadow.
-Theory theory_of_constant_bias(const RayCaster& caster, const View& view, const vec3& to_light, double bias, const Texel& texel,
-                               int needles, int threads);
+// integer finds them. The floor is what the bias leaks. The boundary is that of the shadow which the bias leaves; where
+// the bias makes a pixel wrong anyway a crossing puts it right and counts -1. The bias smooths the coast away, so one
+// texel stands for all; it must be smaller than the bias over a surface's slope, or that is taken for its own shadow.
+Theory theory_of_constant_bias(const RayCaster& caster, const View& view, const vec3& to_light, double bias,
+                               const Texel& texel, int needles, int threads);
