@@ -611,13 +611,13 @@ static void add_fences(const Folder& folder) {
 }
 SCENE(fences) {
     add_fences(folder);
-    return folder.frame("--size 192x128 --shadow-size 1024 --eye -.4,3,2.5 --light 2,1,0 fences.obj");
+    return folder.frame("--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0 fences.obj");
 }
 
 // ... but with the lesson's constant as the bias the lowest one does not, and the others not at their foot.
 SCENE(fences_lesson_bias) {
     add_fences(folder);
-    return folder.frame("--size 192x128 --shadow-size 1024 --bias 43.34 --eye -.4,3,2.5 --light 2,1,0 fences.obj");
+    return folder.frame("--size 480x320 --shadow-size 1024 --bias 43.34 --eye -.3,1.6,1.6 --light 2,1,0 fences.obj");
 }
 
 // The light is right above, in the direction of up: the shadow of a table is under it.
