@@ -235,6 +235,22 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
         for (int corner = 0; corner < model.nfaces() * 3; corner++)
             corners_.push_back(project(to_screen * point(model.vert(corner / 3, corner % 3))));
     const auto cell_of = [&](double v) { return std::clamp(static_cast<int>(std::floor(v)), 0, cells_ - 1); };
+    // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a face,
+    // the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of faces.
+    constexpr double most_entries = 64;
+    const auto box_cells = [&] {
+        double sum = 0;
+        for (int f = 0; f < faces; f++) {
+            const vec3* const p = &corners_[static_cast<std::size_t>(f) * 3];
+            const auto [x0, x1] = std::minmax({p[0].x, p[1].x, p[2].x});
+            const auto [y0, y1] = std::minmax({p[0].y, p[1].y, p[2].y});
+            sum += ((x1 - x0) * scale_ + 1) * ((y1 - y0) * scale_ + 1);
+        }
+        return sum;
+    };
+    while (cells_ > 1 && box_cells() > most_entries * faces) cells_ = (cells_ + 1) / 2, scale_ /= 2;
+    for (vec3& p : corners_) p.x *= scale_, p.y *= scale_;
+
     // The cells that a face touches: those of its box that lie on the inner side of its three edges, at least in part.
     // A face that the light sees edge-on casts no shadow.
     const auto for_each_cell = [&](int face, auto&& visit) {
@@ -281,7 +297,8 @@ std::size_t LightGrid::bytes() const {
     return corners_.size() * sizeof(vec3) + first_.size() * sizeof(first_[0]) + entries_.size() * sizeof(Entry);
 }
 
-bool LightGrid::shadows(const vec3& p, int number) const {
+bool LightGrid::shadows(const vec3& on_screen, int number) const {
+    const vec3 p{on_screen.x * scale_, on_screen.y * scale_, on_screen.z};
     if (!(p.x >= 0 && p.y >= 0 && p.x < cells_ && p.y < cells_)) return false;  // beside all casters
     const std::size_t c = static_cast<std::size_t>(p.y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(p.x);
     for (std::uint32_t i = first_[c]; i < first_[c + 1]; i++) {

@@ -367,14 +367,14 @@ long draw_color(int begin, int end, const Shader& shader, const mat4& Viewport, 
 class LightGrid {
 public:
     LightGrid() = default;
-    // The light's screen is cells x cells large and shows all faces.
+    // The light's screen is cells x cells large and shows all faces. Takes at most some 600 bytes a face.
     LightGrid(const std::vector<Model>& models, const Camera& light, int cells);
 
     // About one cell a face: measured, fewer make long lists and more take longer to fill than they save.
     static int good_cells(int faces) { return std::clamp(static_cast<int>(std::sqrt(faces)), 1, 2048); }
 
-    // Whether any face but `number` lies between the light and the point p of that face, p on the light's screen.
-    bool shadows(const vec3& p, int number) const;
+    // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
+    bool shadows(const vec3& on_screen, int number) const;
 
     std::size_t entries() const { return entries_.size(); }
     std::size_t bytes() const;
@@ -386,7 +386,8 @@ private:
     };
     bool covers(int face, const vec3& p) const;
 
-    int cells_ = 0;
+    int cells_ = 0;                     // a side
+    double scale_ = 1;                  // cells to a pixel of the light's screen
     double zmax_ = 0;                   // the largest |z| of all corners
     std::vector<vec3> corners_;         // three a face
     std::vector<std::uint32_t> first_;  // entries of cell c: first_[c] to first_[c+1]

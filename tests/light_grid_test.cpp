@@ -133,4 +133,23 @@ TEST("no light falls through a seam, no flat surface shadows itself") {
     }
 }
 
+TEST("a soup of large faces takes memory by the face, and is still right") {
+    Random r(4);
+    std::vector<vec3> corners;
+    for (int i = 0; i < 2000 * 3; i++) corners.push_back(r.point(1));
+    const std::vector<Model> models{model_of(corners)};
+    const Camera fine = fitted_camera(models, {0, 0, 1}, {0, 1, 0}, 512), coarse = fitted_camera(models, {0, 0, 1}, {0, 1, 0}, 1);
+    const LightGrid grid(models, fine, 512), whole(models, coarse, 1);
+    CHECK(grid.bytes() <= 600 * 2000);
+    for (int i = 0; i < 2000; i++) {
+        const int face = static_cast<int>(r.rng() % 2000);
+        const auto at = [&](const Camera& c) {
+            vec3 s;
+            for (int k = 0; k < 3; k++) s = s + project(c.object_to_screen() * point(models[0].vert(face, k))) / 3;
+            return s;
+        };
+        CHECK_EQ(grid.shadows(at(fine), face), whole.shadows(at(coarse), face));
+    }
+}
+
 int main(int argc, char** argv) { return run_tests(argc, argv); }
