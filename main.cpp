@@ -135,8 +135,8 @@ struct PhongShader final : IShader {
 
     PhongShader(const Scene& scene, const Model& m, const Material& mat, const Shadow& s, int first)
         : model(m), material(mat), shadow(s), first_number(first), uniform_M(scene.viewer.ModelView),
-          uniform_P(scene.viewer.Projection), uniform_MIT(invert_transpose(uniform_M).value()),
-          uniform_l(normalized((uniform_M * direction(scene.opt.light)).xyz())) {}
+          uniform_P(scene.viewer.Projection), uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
+          uniform_l(normalized((uniform_M * direction(normalized(scene.opt.light))).xyz())) {}
 
     vec4 vertex(int face, int corner) override {
         const vec3& v = model.vert(face, corner);
@@ -311,9 +311,9 @@ static Options parse(int argc, char** argv) {
             if (std::sscanf(value(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most) fail("1 to " + std::to_string(most));
         };
         const auto vector = [&](vec3& v) {
-            if (std::sscanf(value(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !std::isfinite(v.x) ||
-                !std::isfinite(v.y) || !std::isfinite(v.z))
-                fail("three numbers X,Y,Z");
+            if (std::sscanf(value(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(std::fabs(v.x) <= 1e307) ||
+                !(std::fabs(v.y) <= 1e307) || !(std::fabs(v.z) <= 1e307))
+                fail("three numbers X,Y,Z, none beyond 1e307");
         };
         if (arg == "--help") std::exit(std::fputs(usage_text, stdout) < 0);
         else if (arg == "--version") std::exit(std::puts("umbra " UMBRA_VERSION) < 0);

@@ -6,7 +6,7 @@
 mat4 lookat(const vec3& eye, const vec3& center, const vec3& up) {
     vec3 z = normalized(eye - center);
     if (z == vec3{}) z = {0, 0, 1};
-    vec3 x = normalized(cross(up, z));
+    vec3 x = normalized(cross(normalized(up), z));
     if (x == vec3{}) {
         const vec3 a{std::fabs(z.x), std::fabs(z.y), std::fabs(z.z)};
         const vec3 axis = a.y <= a.x && a.y <= a.z ? vec3{0, 1, 0} : a.x <= a.z ? vec3{1, 0, 0} : vec3{0, 0, 1};
@@ -47,9 +47,14 @@ Camera fitted_camera(const std::vector<Model>& models, const vec3& direction, co
             for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
         }
     }
+    double largest = 0;
+    for (int i = 0; i < 3; i++) largest = std::max({largest, std::fabs(low[i]), std::fabs(high[i])});
     for (int i = 0; i < 3; i++) {  // the box [low,high] to [-1,1]^3
-        const double half = (high[i] - low[i]) / 2;
-        if (!(half > 0)) continue;  // no extent: any scale will do
+        double half = high[i] / 2 - low[i] / 2;
+        // What is flat as the light sees it has a depth of rounding alone, which must not be blown up: it is some 2^-50 of
+        // the largest coordinate, and screen_depth/2 * 2^-50 / 2^-24 is below a quarter of depth_rounding.
+        if (i == 2) half = std::max(half, largest * 0x1p-24);
+        if (!(half >= 0x1p-1000)) half = 1;  // no extent, or one whose inverse is no double: any scale will do
         camera.Projection[i][i] = 1 / half;
         camera.Projection[i][3] = -(low[i] + half) / half;
     }
@@ -97,6 +102,17 @@ struct Planes {
             default: return top * s.w - s.y;
         }
     }
+    // What a sum of large numbers lost of a distance that is zero: the end of an edge that is 1e20 pixels long would be
+    // thousands of pixels off its plane.
+    void put_on(int plane, vec4& s) const {
+        switch (plane) {
+            case 0: s.w = w_near; break;
+            case 1: s.x = -guard * s.w; break;
+            case 2: s.x = right * s.w; break;
+            case 3: s.y = -guard * s.w; break;
+            default: s.y = top * s.w;
+        }
+    }
 };
 
 // Sutherland and Hodgman, one plane. A cut edge gets the same new corner from both of its faces, bit for bit: it is always
@@ -111,7 +127,8 @@ int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* o
             const bool a_inside = da >= 0;
             const double d_in = a_inside ? da : db, d_out = a_inside ? db : da;
             const vec4 &p = a_inside ? a : b, &q = a_inside ? b : a;
-            out[m++] = p + (q - p) * (d_in / (d_in - d_out));
+            out[m] = p + (q - p) * (d_in / (d_in - d_out));
+            planes.put_on(plane, out[m++]);
         }
     }
     return m;
@@ -120,13 +137,13 @@ int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* o
 }  // namespace
 
 Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int height, TriangleSetup& t) {
-    const vec4 s[3] = {Viewport * clip[0], Viewport * clip[1], Viewport * clip[2]};
+    vec4 s[3] = {Viewport * clip[0], Viewport * clip[1], Viewport * clip[2]};
 
     for (const vec4& p : s)  // a coordinate beyond the range of a double has no place on the screen
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z) || !std::isfinite(p.w)) return Setup::outside;
 
     // Wholly behind the eye or beyond one side of the picture.
-    const auto all = [&](auto&& outside) { return outside(s[0]) && outside(s[1]) && outside(s[2]); };
+    const auto all = [&s](auto&& outside) { return outside(s[0]) && outside(s[1]) && outside(s[2]); };
     if (all([](const vec4& p) { return !(p.w >= w_near); }) || all([](const vec4& p) { return !(p.x > 0); }) ||
         all([](const vec4& p) { return !(p.y > 0); }) || all([=](const vec4& p) { return !(p.x < width * p.w); }) ||
         all([=](const vec4& p) { return !(p.y < height * p.w); }))
@@ -163,6 +180,9 @@ Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int
         lo[1] = std::min(lo[1], t.y[i]), hi[1] = std::max(hi[1], t.y[i]);
         t.zmin = std::min(t.zmin, p.z), t.zmax = std::max(t.zmax, p.z);
     }
+    // A depth beyond the range of a float is drawn as its largest one, not as infinity.
+    constexpr double most = std::numeric_limits<float>::max();
+    t.zmin = std::clamp(t.zmin, -most, most), t.zmax = std::clamp(t.zmax, -most, most);
     // Pixel x has its centre at x + half: the first at or right of lo, the last at or left of hi.
     t.xmin = std::max(0, (lo[0] + half - 1) >> TriangleSetup::subpixel_bits);
     t.ymin = std::max(0, (lo[1] + half - 1) >> TriangleSetup::subpixel_bits);
@@ -174,6 +194,12 @@ Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int
     // coordinates", 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are linear functions
     // on the screen whose ratio is that of the barycentric coordinates on the face. They hold for the whole face, clipped or
     // not, corners behind the eye included. Coordinates relative to a pixel of the face keep the products small.
+    // Homogeneous coordinates may be scaled: by a power of two, exactly, so that no product leaves the range of a double.
+    double size = 0;
+    for (const vec4& p : s) size = std::max({size, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), std::fabs(p.w)});
+    if (!(size > 0x1p-200 && size < 0x1p200))
+        for (vec4& p : s)
+            for (int i = 0; i < 4; i++) p[i] = std::scalbn(p[i], -std::ilogb(size));
     t.origin = {t.xmin + .5, t.ymin + .5};
     vec3 v[3];
     for (int i = 0; i < 3; i++) v[i] = {s[i].x - t.origin.x * s[i].w, s[i].y - t.origin.y * s[i].w, s[i].w};
@@ -234,7 +260,7 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
     for (const Model& model : models)
         for (int corner = 0; corner < model.nfaces() * 3; corner++)
             corners_.push_back(project(to_screen * point(model.vert(corner / 3, corner % 3))));
-    const auto cell_of = [&](double v) { return std::clamp(static_cast<int>(std::floor(v)), 0, cells_ - 1); };
+    const auto cell_of = [&](double v) { return v > 0 ? static_cast<int>(std::min(v, cells_ - 1.)) : 0; };  // NaN: 0
     // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a face,
     // the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of faces.
     constexpr double most_entries = 64;
@@ -256,7 +282,7 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
     const auto for_each_cell = [&](int face, auto&& visit) {
         const vec3* const p = &corners_[static_cast<std::size_t>(face) * 3];
         const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
-        if (!(area != 0)) return;
+        if (!(std::fabs(area) > 0)) return;  // nor one beyond the range of a double
         const double side = area < 0 ? -1 : 1;
         const int x0 = cell_of(std::min({p[0].x, p[1].x, p[2].x})), x1 = cell_of(std::max({p[0].x, p[1].x, p[2].x}));
         const int y0 = cell_of(std::min({p[0].y, p[1].y, p[2].y})), y1 = cell_of(std::max({p[0].y, p[1].y, p[2].y}));

@@ -115,8 +115,8 @@ constexpr double power(double base, unsigned exponent) {
 // The texel (floor(u*w), floor(v*h)): nearest, wrapped round. uv finite, of any size; the picture not empty.
 inline const std::uint8_t* sample2D(const TGAImage& map, const vec2& uv) {
     const auto wrapped = [](double t, int size) {
-        const int i = static_cast<int>((t - std::floor(t)) * size);
-        return std::min(i, size - 1);  // t - floor(t) may round up to 1
+        const double f = t - std::floor(t);  // may round up to 1; no number where t is beyond the range of a double
+        return f >= 0 ? std::min(static_cast<int>(f * size), size - 1) : 0;
     };
     return map.pixel(wrapped(uv.x, map.width()), wrapped(uv.y, map.height()));
 }
