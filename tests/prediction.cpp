@@ -20,10 +20,6 @@ struct LightFrame {  // of the scene as the light sees it
     vec2 seen(const vec3& p) const { return {dot(p, x), dot(p, y)}; }
 };
 
-double area(const vec2& a, const vec2& b, const vec2& c) {  // twice the signed one
-    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
-
 struct Random {  // splitmix64 (Steele, Lea, Flood 2014)
     std::uint64_t state;
     double operator()() {  // in [0,1)
@@ -34,75 +30,32 @@ struct Random {  // splitmix64 (Steele, Lea, Flood 2014)
     }
 };
 
-// The faces on the other sides of a face's edges. Corners belong together where they are at the same place.
-class Neighbours {
+// What a shadow buffer of endless resolution would hold: the surface nearest to the light.
+class Front {
 public:
-    explicit Neighbours(const RayCaster& caster) {
+    Front(const RayCaster& caster, const LightFrame& light) : caster_(caster), light_(light) {
         for (int f = 0; f < caster.ntriangles(); f++)
-            for (std::size_t i = 0; i < 3; i++)
-                edges_.push_back({caster.triangle(f)[i], caster.triangle(f)[(i + 1) % 3], f});
-        std::sort(edges_.begin(), edges_.end(), [](const Edge& a, const Edge& b) {
-            const int order = compare(a, b);
-            return order != 0 ? order < 0 : a.face < b.face;
-        });
+            for (const vec3& corner : caster.triangle(f))
+                for (int i = 0; i < 3; i++) size_ = std::max(size_, 2 * std::fabs(corner[i]));
     }
-    int across(const vec3& from, const vec3& to) const {  // the face that runs from `to` to `from`, -1 for none
-        const Edge wanted{to, from, 0};
-        const auto e = std::lower_bound(edges_.begin(), edges_.end(), wanted,
-                                        [](const Edge& a, const Edge& b) { return compare(a, b) < 0; });
-        return e != edges_.end() && compare(*e, wanted) == 0 ? e->face : -1;
+    struct Point {
+        int face;       // -1 where there is nothing
+        double height;  // towards the light; there minus infinity
+    };
+    Point at(const vec2& p) const {  // as the light sees it
+        const vec3 above = light_.x * p.x + light_.y * p.y + light_.z * size_;
+        const auto hit = caster_.first_hit(above, -light_.z);
+        if (!hit) return {-1, -std::numeric_limits<double>::infinity()};
+        return {hit->triangle, dot(hit->point, light_.z)};
     }
+    // A height is known to some ten roundings of numbers of the scene's size.
+    double rounding() const { return 16 * size_ * std::numeric_limits<double>::epsilon(); }
 
 private:
-    struct Edge {
-        vec3 from, to;
-        int face;
-    };
-    static int compare(const Edge& a, const Edge& b) {
-        for (int i = 0; i < 6; i++) {
-            const double left = i < 3 ? a.from[i] : a.to[i - 3], right = i < 3 ? b.from[i] : b.to[i - 3];
-            if (left != right) return left < right ? -1 : 1;
-        }
-        return 0;
-    }
-    std::vector<Edge> edges_;
+    const RayCaster& caster_;
+    LightFrame light_;
+    double size_ = 0;  // more than any height
 };
-
-// Where a needle that starts on a face ends: on which face, and where on its plane.
-struct NeedleEnd {
-    int face;
-    vec3 weight;
-};
-
-NeedleEnd walk(const RayCaster& caster, const Neighbours& neighbours, const LightFrame& light, int face,
-               const vec2& start, const vec2& goal, const vec3& to_light) {
-    NeedleEnd end{face, {}};
-    int came_over = -1;
-    // A straight line meets a convex face once: more steps than faces would be rounding's doing.
-    for (int step = 0; step < caster.ntriangles(); step++) {
-        const Triangle& t = caster.triangle(end.face);
-        const vec2 p[3] = {light.seen(t[0]), light.seen(t[1]), light.seen(t[2])};
-        int leave_over = -1;  // the edge that lies opposite to this corner
-        double leave_at = std::numeric_limits<double>::infinity();
-        for (int i = 0; i < 3; i++) {
-            const vec2 &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
-            end.weight[i] = area(a, b, goal);
-            if (!(end.weight[i] < 0) || i == came_over) continue;
-            const double before = std::max(area(a, b, start), 0.), at = before / (before - end.weight[i]);
-            if (at < leave_at) leave_over = i, leave_at = at;
-        }
-        if (leave_over < 0) return end;
-        const vec3 &a = t[static_cast<std::size_t>((leave_over + 1) % 3)],
-                   &b = t[static_cast<std::size_t>((leave_over + 2) % 3)];
-        const int next = neighbours.across(a, b);
-        if (next < 0 || !caster.faces(next, to_light))
-            return end;  // the surface ends: its plane goes on, as in a buffer
-        end.face = next;
-        came_over = 0;
-        while (caster.triangle(next)[static_cast<std::size_t>((came_over + 1) % 3)] != b) came_over++;
-    }
-    return end;
-}
 
 struct Count {
     long facing = 0, wrong = 0;   // pixels: all, and those wrong without any needle
@@ -168,18 +121,34 @@ double Theory::wrong() const { return floor + 2 / std::numbers::pi * mean_needle
 
 Theory Theory::with_texels(double factor) const { return {floor, mean_needle * factor, boundary_per_area, deviation}; }
 
-Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel,
-                            int needles, int threads) {
+Theory theory_of_derived_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel,
+                              int needles, int threads) {
     const LightFrame light(to_light, view.up);
-    const Neighbours neighbours(caster);
+    const Front front(caster, light);
     const Count count = for_each_facing(caster, view, to_light, threads, [&](const Hit& hit, Random& random, Count& c) {
-        const bool dark = caster.occluded(hit.triangle, hit.weight, to_light);
+        const Triangle& t = caster.triangle(hit.triangle);
+        const vec3 n = cross(t[1] - t[0], t[2] - t[0]);
         const vec2 start = light.seen(hit.point);
+        const vec2 slope = light.seen(n) / -dot(n, light.z);  // of the receiver, along the light's x and y
+        const double height = dot(hit.point, light.z);
+        const auto dark = [&](const vec2& needle) {
+            const Front::Point above = front.at(start + needle);
+            if (above.face == hit.triangle || above.height <= height + dot(slope, needle) + front.rounding()) return false;
+            double lowest = above.height;
+            for (const vec2& side : {vec2{texel.width, 0}, vec2{0, texel.height}}) {
+                const double a = front.at(start + needle + side).height, b = front.at(start + needle - side).height;
+                const double fall = std::min(std::fabs(above.height - a), std::fabs(above.height - b));
+                lowest -= a < above.height && b < above.height ? fall / 2 : fall;
+            }
+            return lowest > height + front.rounding();
+        };
+        const bool shadowed = caster.occluded(hit.triangle, hit.weight, to_light);
+        const bool wrong = dark({}) != shadowed;
+        c.wrong += wrong;
         for (int i = 0; i < needles; i++) {
             const double x = (random() - .5) * texel.width, y = (random() - .5) * texel.height;
-            const NeedleEnd end = walk(caster, neighbours, light, hit.triangle, start, start + vec2{x, y}, to_light);
-            const bool crosses = caster.occluded(end.face, end.weight, to_light) != dark;
-            c.crossings += crosses, c.net += crosses;
+            const bool crosses = (dark({x, y}) != shadowed) != wrong;
+            c.crossings += crosses, c.net += crosses ? (wrong ? -1 : 1) : 0;
         }
     });
     return theory(count, mean_distance(texel), needles);

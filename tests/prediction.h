@@ -12,6 +12,15 @@
 #pragma once
 #include "truth.h"
 
+// What a shadow buffer with square texels of side h, read at the nearest texel, adds to the errors of its bias:
+//     share of wrong pixels = nearest_texel_error * h * L/A,
+// L the length of the shadow's boundary and A the area that faces the light, both as the light sees them.
+// A point is judged by its texel's centre, wrongly where the boundary passes between the two. Shift a straight boundary
+// with unit normal n through all positions: the wrong area for each h of length is then h^2 times the integral of
+// |x . n| over the unit square around 0. The mean of |x . n| over all n is 2/pi |x|, and the mean of |x| over the
+// square is (sqrt(2) + ln(1 + sqrt(2)))/6.
+inline constexpr double nearest_texel_error = 0.2435693614160477;  // (sqrt(2) + ln(1 + sqrt(2))) / (3 pi)
+
 // A texel of the light's picture, as the light sees it, in the scene's unit; x and y are those of lookat().
 struct Texel {
     double width, height;
@@ -33,12 +42,13 @@ struct Theory {
     Theory with_texels(double factor) const;  // the same boundary under texels larger by a factor
 };
 
-// A bias that vanishes with the texel, samples at the texels' centres: no floor. L is that of the true shadow: a needle
-// runs over the surface, from face to face as long as they face the light, and its two ends are compared. Like a
-// coast's, this length grows as needles get shorter: a lit face among dark ones where the surface turns away from the
-// light is narrower than any texel. So needles have the texel's own size.
-Theory theory_of_exact_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel,
-                            int needles, int threads);
+// A bias derived from the slopes: a point's plane is carried to the sample, the texel's centre; what is above it there
+// may be lower by what the nearest surface falls within a texel (along each axis the smaller of the two differences,
+// half of it on a ridge). The floor is what that leaks where sample and point are the same. The boundary is that of the
+// shadow which the bias leaves, and a crossing that puts a wrong pixel right counts -1. Both depend on the texel: a
+// shadow's coast has more creeks the finer it is looked at, so there is a theory for each size of texel.
+Theory theory_of_derived_bias(const RayCaster& caster, const View& view, const vec3& to_light, const Texel& texel,
+                              int needles, int threads);
 
 // A constant bias, in the scene's unit; samples at the texels' corners with the smallest x and y, as an index cut to an
 // integer finds them. The floor is what the bias leaks. The boundary is that of the shadow which the bias leaves; where

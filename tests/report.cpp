@@ -214,10 +214,10 @@ void predict_errors(const Options& opt, const Umbra& umbra, const std::vector<Co
     for (const std::string& path : opt.models) models.emplace_back(path), models.back().fit();
     const RayCaster caster(models);
     View view;  // umbra's defaults
-    view.width = view.height = picture_side;
+    view.width = view.height = fine_side;
     if (!opt.eye.empty()) view.eye = parse_vector("--eye", opt.eye);
     const vec3 to_light = opt.light.empty() ? vec3{1, 1, 0} : parse_vector("--light", opt.light);
-    constexpr int needles = 12;
+    constexpr int needles = 3;
     const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
     const double unit = mean_distance({1, 1});
 
@@ -234,8 +234,8 @@ void predict_errors(const Options& opt, const Umbra& umbra, const std::vector<Co
         const bool at_corner = c.kind == Configuration::Kind::constant;
         const Theory t = at_corner
                              ? constant.with_texels(2 / (.75 * c.size) / short_texel)  // [-1,1] on 3/4 of the buffer
-                             : theory_of_exact_bias(caster, view, to_light,
-                                                    fitted_texel(caster, to_light, view.up, c.size), needles, threads);
+                             : theory_of_derived_bias(caster, view, to_light,
+                                                      fitted_texel(caster, to_light, view.up, c.size), needles, threads);
         const std::string fine = "--size " + std::to_string(fine_side) + "x" + std::to_string(fine_side) +
                                  " --threads " + std::to_string(threads);
         const auto said = umbra.run("--report " + fine + " " + c.arguments());

@@ -2,6 +2,7 @@
 // it holds them against. The measuring itself is not tested here.
 #include <algorithm>
 #include <numbers>
+#include <random>
 
 #include "chart.h"
 #include "check.h"
@@ -162,6 +163,19 @@ TEST("a chart without methods, or with a time of zero, is refused") {
     CHECK_THROWS(svg({figures("m", 1, 1, NAN)}, "", ""), "positive");
     CHECK(!svg({figures("m", 1, 0, 3)}, "", "").empty());  // nothing but zeros
 }
+TEST("the error of the nearest texel") {
+    // The mean of |x . n| over the square and all directions, by the midpoint rule.
+    double sum = 0;
+    const int n = 200, directions = 90;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            for (int k = 0; k < directions; k++) {
+                const double angle = pi * (k + .5) / directions;
+                sum += std::fabs(((i + .5) / n - .5) * std::cos(angle) + ((j + .5) / n - .5) * std::sin(angle));
+            }
+    CHECK_NEAR(sum / (n * n * directions), nearest_texel_error, 5e-5);
+    CHECK_NEAR((std::sqrt(2.) + std::log(1 + std::sqrt(2.))) / (3 * pi), nearest_texel_error, 1e-16);
+}
 TEST("the mean distance in a square is the one that the error of the nearest texel comes from") {
     CHECK_NEAR(2 / pi * mean_distance({1, 1}), nearest_texel_error, 1e-15);
     CHECK_NEAR(mean_distance({3, 3}), 3 * mean_distance({1, 1}), 1e-14);
@@ -185,7 +199,7 @@ TEST("a fitted texel is a share of what the light sees") {
 TEST("needles measure the boundary of a round shadow, on a flat floor cut into few squares or many") {
     for (const int n : {1, 60}) {
         const RayCaster caster(disk_over(floor_mesh(n, 0)));
-        const Theory t = theory_of_exact_bias(caster, from_above, light, {.03, .03}, 16, 2);
+        const Theory t = theory_of_derived_bias(caster, from_above, light, {.03, .03}, 16, 2);
         CHECK_EQ(t.floor, 0);
         CHECK(t.deviation < .02 * circle_per_area);
         CHECK_NEAR(t.boundary_per_area, circle_per_area, 4 * t.deviation);
@@ -194,11 +208,11 @@ TEST("needles measure the boundary of a round shadow, on a flat floor cut into f
 }
 TEST("needles that are longer one way see the same round shadow") {
     const RayCaster caster(disk_over(floor_mesh(1, 0)));
-    const Theory t = theory_of_exact_bias(caster, from_above, light, {.01, .05}, 16, 2);
+    const Theory t = theory_of_derived_bias(caster, from_above, light, {.01, .05}, 16, 2);
     CHECK_NEAR(t.boundary_per_area, circle_per_area, 4 * t.deviation);
 }
 TEST("creases that cast no shadow have no boundary") {  // slopes of 1/3 at most: the light comes in steeper
-    const Theory t = theory_of_exact_bias(RayCaster(floor_mesh(60, .033)), from_above, light, {.2, .2}, 8, 2);
+    const Theory t = theory_of_derived_bias(RayCaster(floor_mesh(60, .033)), from_above, light, {.2, .2}, 8, 2);
     CHECK_EQ(t.boundary_per_area, 0);
 }
 TEST("a constant bias has the same boundary, and needles twice as long for samples at the corners") {
@@ -217,10 +231,49 @@ TEST("a constant bias larger than every gap leaks the whole shadow and leaves no
     CHECK_EQ(t.boundary_per_area, 0);
     CHECK_EQ(t.with_texels(10).wrong(), t.floor);
 }
+TEST("the predicted error is the one that a buffer makes") {
+    const RayCaster caster(disk_over(floor_mesh(1, 0)));
+    const Theory t = theory_of_constant_bias(caster, from_above, light, .1, {.015, .015}, 16, 2);
+    const TruthImage truth = cast(caster, from_above, light, 2);
+    const vec3 l = normalized(light), x = normalized(cross(l, vec3{0, 0, 1})), y = cross(l, x);
+    constexpr double h = .15;  // 34 texels along the shadow's boundary
+    std::mt19937 random(71);
+    const auto in = [&](double most) { return most * static_cast<double>(random()) / 4294967296.; };
+    double percent = 0;
+    constexpr int buffers = 20;
+    for (int i = 0; i < buffers; i++) {  // each with its texels elsewhere, turned otherwise
+        const double angle = in(pi), u0 = in(1), v0 = in(1);
+        const vec3 u = x * std::cos(angle) + y * std::sin(angle), v = cross(l, u);
+        std::vector<std::uint8_t> lit;
+        for (int py = 0; py < from_above.height; py++)
+            for (int px = 0; px < from_above.width; px++) {
+                const vec3 point = caster.first_hit(from_above.eye, from_above.direction(px, py))->point;
+                const double s = dot(point, u) / h + u0, r = dot(point, v) / h + v0;
+                const vec3 texel = point + u * ((std::floor(s) + .5 - s) * h) + v * ((std::floor(r) + .5 - r) * h);
+                lit.push_back(!caster.occluded(texel, l, .1));
+            }
+        percent += compare(truth, lit).percent() / buffers;
+    }
+    CHECK_NEAR(percent / (100 * nearest_texel_error * h * t.boundary_per_area), 1, .04);
+}
+TEST("a bias derived from the slopes makes the foot of a shadow thinner than a texel") {
+    // A board that leans from a floor over its own shadow: seen by the light it rises to its upper edge with slope 1.
+    std::vector<Triangle> mesh = floor_mesh(3, 0);
+    quad(mesh, {0, 0, -1}, {0, 0, 1}, {-1, 1, 1}, {-1, 1, -1});
+    const RayCaster caster(mesh);
+    const vec3 overhead{.001, 1, .002};
+    double last = 1;
+    for (const double h : {.08, .04, .02}) {
+        const View under_it{{-6, 1, .3}, {-.5, .3, 0}, {0, 1, 0}, 300, 300};
+        const Theory t = theory_of_derived_bias(caster, under_it, overhead, {h, h}, 8, 2);
+        CHECK(t.floor > 0 && t.floor < last);
+        last = .6 * t.floor;  // half, if pixels were points
+    }
+}
 TEST("theory does not depend on the number of threads") {
     const RayCaster caster(disk_over(floor_mesh(7, .1)));
-    const Theory a = theory_of_exact_bias(caster, from_above, light, {.03, .03}, 2, 1);
-    const Theory b = theory_of_exact_bias(caster, from_above, light, {.03, .03}, 2, 3);
+    const Theory a = theory_of_derived_bias(caster, from_above, light, {.03, .03}, 2, 1);
+    const Theory b = theory_of_derived_bias(caster, from_above, light, {.03, .03}, 2, 3);
     CHECK_EQ(a.boundary_per_area, b.boundary_per_area);
 }
 

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -545,55 +544,4 @@ ShadowError compare(const TruthImage& truth, std::span<const std::uint8_t> lit) 
         if (!truly_lit && lit[i]) error.falsely_lit++;
     }
     return error;
-}
-
-Prediction predict(const RayCaster& caster, const View& view, const vec3& to_light, double bias, double length,
-                   int needles, int threads) {
-    check_view(view, to_light);
-    const vec3 light = normalized(to_light);
-    const vec3 across1 = normalized(cross(light, least_axis(light))), across2 = cross(light, across1);
-
-    struct Count {
-        long facing = 0, leaking = 0, crossings = 0, net = 0;
-    };
-    std::vector<Count> rows(static_cast<std::size_t>(view.height));
-    for_rows(view.height, threads, [&](int y) {
-        Count& count = rows[static_cast<std::size_t>(y)];
-        std::uint64_t state = static_cast<std::uint64_t>(y);
-        const auto random = [&] {  // splitmix64 (Steele, Lea, Flood 2014), in [0,1)
-            std::uint64_t r = state += 0x9e3779b97f4a7c15;
-            r = (r ^ (r >> 30)) * 0xbf58476d1ce4e5b9;
-            r = (r ^ (r >> 27)) * 0x94d049bb133111eb;
-            return static_cast<double>((r ^ (r >> 31)) >> 11) * 0x1p-53;
-        };
-        for (int x = 0; x < view.width; x++) {
-            const auto hit = caster.first_hit(view.eye, view.direction(x, y));
-            if (!hit || !caster.faces(hit->triangle, to_light)) continue;
-            const bool dark = caster.occluded(hit->point, light, bias);
-            const bool wrong = dark != caster.occluded(hit->triangle, hit->weight, to_light);
-            count.facing++;
-            count.leaking += wrong;
-            const double turn = random();
-            for (int i = 0; i < needles; i++) {
-                const double angle = 2 * std::numbers::pi * (i + turn) / needles;
-                const vec3 end =
-                    hit->point + across1 * (length * std::cos(angle)) + across2 * (length * std::sin(angle));
-                const bool crosses = caster.occluded(end, light, bias) != dark;
-                count.crossings += crosses;
-                count.net += crosses ? (wrong ? -1 : 1) : 0;
-            }
-        }
-    });
-    Count sum;
-    for (const Count& row : rows) {
-        sum.facing += row.facing;
-        sum.leaking += row.leaking;
-        sum.crossings += row.crossings;
-        sum.net += row.net;
-    }
-    if (sum.facing == 0) return {};
-    const double facing = static_cast<double>(sum.facing),
-                 per_crossing = std::numbers::pi / (2 * length * needles * facing);
-    return {static_cast<double>(sum.leaking) / facing, static_cast<double>(sum.net) * per_crossing,
-            std::sqrt(static_cast<double>(sum.crossings)) * per_crossing};
 }

@@ -120,32 +120,3 @@ private:
 // Compares a method's verdicts, one for each pixel, row 0 at the bottom, 0 dark and anything else lit. Only those of
 // the facing pixels are looked at. Throws std::invalid_argument where the sizes differ.
 ShadowError compare(const TruthImage& truth, std::span<const std::uint8_t> lit);
-
-// What a shadow buffer with square texels of side h, read at the nearest texel, adds to the errors of its bias:
-//     share of wrong pixels = nearest_texel_error * h * L/A,
-// L the length of the shadow's boundary and A the area that faces the light, both as the light sees them.
-// A point is judged by its texel's centre, wrongly where the boundary passes between the two. Shift a straight boundary
-// with unit normal n through all positions: the wrong area for each h of length is then h^2 times the integral of
-// |x . n| over the unit square around 0. The mean of |x . n| over all n is 2/pi |x|, and the mean of |x| over the
-// square is (sqrt(2) + ln(1 + sqrt(2)))/6.
-inline constexpr double nearest_texel_error = 0.2435693614160477;  // (sqrt(2) + ln(1 + sqrt(2))) / (3 pi)
-
-// What becomes of a shadow buffer with a constant bias, as a function of its texel's size.
-struct Prediction {
-    double leak = 0;               // share of the facing pixels that the bias makes wrong at any resolution
-    double boundary_per_area = 0;  // L/A, in one over the scene's unit of length
-    double deviation = 0;          // the standard deviation of L/A as it was estimated, if crossings were independent
-
-    // Share of the facing pixels that are wrong with texels of side h, in the scene's unit of length.
-    double wrong(double h) const { return leak + nearest_texel_error * h * boundary_per_area; }
-};
-
-// The leak is counted; L/A follows from Crofton's formula: a needle of length r thrown at random crosses the boundary
-// with the probability 2 r L/(pi A). From the surface point of each facing pixel go `needles` needles across the light,
-// `length` long (in the scene's unit), their directions spread by a fixed seed. One crosses the boundary where its two
-// ends differ in whether something lies more than `bias` towards the light. Where the bias makes the pixel wrong anyway
-// a crossing puts it right, so it counts -1: the part of the boundary that the bias displaced costs nothing. Pixels
-// weigh the same, as in ShadowError. The bias must be larger than length * slope, the slope of the surface as the light
-// sees it, or the surface is taken for its own shadow.
-Prediction predict(const RayCaster& caster, const View& view, const vec3& to_light, double bias, double length,
-                   int needles = 8, int threads = 1);

@@ -610,16 +610,8 @@ TEST("the number of threads does not matter") {
     const RayCaster caster(mesh);
     const View view{{1, 1, 4}, {}, {0, 1, 0}, 97, 61};
     const TruthImage one = cast(caster, view, {1, 1, 0}, 1);
-    const Prediction alone = predict(caster, view, {1, 1, 0}, .05, .01, 2, 1);
     CHECK(count(one, Truth::shadowed) > 100);
-    CHECK(alone.leak > 0 && alone.boundary_per_area > 0);
-    for (const int threads : {2, 3, 7, 100}) {
-        CHECK(same(one, cast(caster, view, {1, 1, 0}, threads)));
-        const Prediction p = predict(caster, view, {1, 1, 0}, .05, .01, 2, threads);
-        CHECK_EQ(p.leak, alone.leak);
-        CHECK_EQ(p.boundary_per_area, alone.boundary_per_area);
-        CHECK_EQ(p.deviation, alone.deviation);
-    }
+    for (const int threads : {2, 3, 7, 100}) CHECK(same(one, cast(caster, view, {1, 1, 0}, threads)));
 }
 TEST("triangles are counted over the models in their order") {
     const TemporaryFolder folder("truth_test");
@@ -647,7 +639,6 @@ TEST("without triangles there is nothing to see") {
     CHECK(!caster.first_hit({}, {0, 0, 1}).has_value());
     CHECK(!caster.occluded({}, {0, 0, 1}, 0));
     CHECK_EQ(count(cast(caster, {{1, 1, 4}, {}, {0, 1, 0}, 3, 2}, {1, 1, 0}), Truth::background), 6);
-    CHECK_EQ(predict(caster, {{1, 1, 4}, {}, {0, 1, 0}, 3, 2}, {1, 1, 0}, .1, .1).wrong(1), 0);
 }
 TEST("meaningless input is refused") {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -682,113 +673,4 @@ TEST("the share of wrong pixels is counted over those that face the light") {
     CHECK_EQ(all.percent_lit(), 100 / 3.);
     CHECK_EQ(compare(TruthImage{1, 1, {Truth::away}, {0}}, std::vector<std::uint8_t>{1}).percent(), 0);
 }
-TEST("the error of the nearest texel") {
-    // The mean of |x . n| over the square and all directions, by the midpoint rule.
-    double sum = 0;
-    const int n = 200, directions = 90;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            for (int k = 0; k < directions; k++) {
-                const double angle = pi * (k + .5) / directions;
-                sum += std::fabs(((i + .5) / n - .5) * std::cos(angle) + ((j + .5) / n - .5) * std::sin(angle));
-            }
-    CHECK_NEAR(sum / (n * n * directions), nearest_texel_error, 5e-5);
-    CHECK_NEAR((std::sqrt(2.) + std::log(1 + std::sqrt(2.))) / (3 * pi), nearest_texel_error, 1e-16);
-}
-
-namespace {
-
-// A floor that fills the picture and a regular polygon across the light, whose shadow falls beside it, seen from above.
-struct DiskScene {
-    static constexpr int corners = 128, size = 200;
-    static constexpr double radius = .2, height = 1;
-    vec3 light = normalized(vec3{1, 1, 0}), across1{0, 0, 1}, across2 = cross(light, across1);
-    View view{{0, 20, 0}, {}, {0, 0, -1}, size, size};
-    RayCaster caster;
-
-    DiskScene() : caster(triangles()) {}
-
-    Mesh triangles() const {
-        Mesh mesh = grid(2, 3, unchanged);
-        const auto at = [&](int i) {
-            const double angle = 2 * pi * (i % corners) / corners;  // the last corner is the first, to the bit
-            return vec3{.5, height, 0} + (across1 * std::cos(angle) + across2 * std::sin(angle)) * radius;
-        };
-        for (int i = 0; i < corners; i++) mesh.push_back({vec3{.5, height, 0}, at(i), at(i + 1)});
-        return mesh;
-    }
-    // All of the boundary is on the floor. As the light sees it, it is the polygon's, and a pixel of the floor has the
-    // area of its square times n.l. All pixels face the light and weigh the same.
-    double boundary_per_area() const {
-        const double pixel = 2 / (.75 * size), perimeter = corners * 2 * radius * std::sin(pi / corners);
-        return perimeter / (size * size * pixel * pixel * light.y);
-    }
-};
-
-}  // namespace
-
-TEST("Crofton's formula finds the length of a disk's shadow") {
-    const DiskScene scene;
-    const TruthImage truth = cast(scene.caster, scene.view, scene.light);
-    CHECK_EQ(count(truth, Truth::lit) + count(truth, Truth::shadowed), scene.size * scene.size);
-    for (const double length : {.02, .005}) {
-        const Prediction p = predict(scene.caster, scene.view, scene.light, .1, length, 32);
-        CHECK_EQ(p.leak, 0);
-        CHECK(p.deviation < .04 * scene.boundary_per_area());
-        CHECK_NEAR(p.boundary_per_area, scene.boundary_per_area(), 3 * p.deviation);
-    }
-}
-TEST("the predicted error of a shadow buffer is the one that a buffer makes") {
-    const DiskScene scene;
-    const TruthImage truth = cast(scene.caster, scene.view, scene.light);
-    const Prediction p = predict(scene.caster, scene.view, scene.light, .1, .01, 32);
-    const double h = .05;  // 25 texels along the disk's circumference
-    std::vector<vec3> points;
-    for (int y = 0; y < scene.view.height; y++)
-        for (int x = 0; x < scene.view.width; x++)
-            points.push_back(scene.caster.first_hit(scene.view.eye, scene.view.direction(x, y))->point);
-    Random random(71);
-    double percent = 0;
-    const int buffers = 20;
-    for (int i = 0; i < buffers; i++) {  // each with its texels elsewhere, turned otherwise
-        const double angle = random(0, pi), u0 = random(0, 1), v0 = random(0, 1);
-        const vec3 u = scene.across1 * std::cos(angle) + scene.across2 * std::sin(angle), v = cross(scene.light, u);
-        std::vector<std::uint8_t> lit;
-        for (const vec3& point : points) {
-            const double s = dot(point, u) / h + u0, t = dot(point, v) / h + v0;
-            const vec3 texel = point + u * ((std::floor(s) + .5 - s) * h) + v * ((std::floor(t) + .5 - t) * h);
-            lit.push_back(!scene.caster.occluded(texel, scene.light, .1));
-        }
-        percent += compare(truth, lit).percent() / buffers;
-    }
-    CHECK_NEAR(percent / (100 * p.wrong(h)), 1, .04);
-}
-TEST("the part of the boundary that the bias displaces costs nothing but the leak") {
-    // A wall on a floor, seen from above, along the wall; the light at 45 degrees throws its shadow to the left.
-    constexpr double width = .8, height = .6, bias = .1, extent = 2 / .75;
-    Mesh mesh = grid(2, 3, unchanged);
-    quad(mesh, {0, 0, -width / 2}, {0, 0, width / 2}, {0, height, width / 2}, {0, height, -width / 2});
-    const RayCaster caster(mesh);
-    const View view{{0, 20, 0}, {}, {.3, 0, -1}, 200, 200};  // turned, lest the pixels keep step with the wall
-    const Prediction p = predict(caster, view, {1, 1, 0}, bias, .01, 24);
-    // The light passes a point at the distance s from the wall with t = s sqrt(2) to go to the wall. Seen by the light,
-    // lengths along the wall are as they are and those across it by sqrt(1/2) shorter, like the area.
-    const double leaking = bias * std::sqrt(.5), area = extent * extent * std::sqrt(.5);
-    CHECK_NEAR(p.leak, leaking * width / (extent * extent), .05 * p.leak);
-    CHECK(p.deviation < .03 * p.boundary_per_area);
-    CHECK_NEAR(p.boundary_per_area, (width + 2 * (height - leaking) * std::sqrt(.5)) / area, 3 * p.deviation);
-}
-TEST("a bias beyond everything leaks every shadow") {
-    Mesh mesh = landscape(8, 81);
-    const RayCaster caster(mesh);
-    const View view{{1, 2, 3}, {}, {0, 1, 0}, 100, 100};
-    const TruthImage truth = cast(caster, view, {1, .25, .3});
-    const double shadowed = static_cast<double>(count(truth, Truth::shadowed));
-    const double facing = shadowed + static_cast<double>(count(truth, Truth::lit));
-    CHECK(shadowed > 500);
-    const Prediction p = predict(caster, view, {1, .25, .3}, 100, .01);
-    CHECK_EQ(p.leak, shadowed / facing);
-    CHECK_EQ(p.boundary_per_area, 0);
-}
-
 int main(int argc, char** argv) { return run_tests(argc, argv); }
