@@ -29,6 +29,7 @@ struct Options {  // the lesson's scene
     int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 };
 
+// All coordinates are relative to opt.center: no matrix has to undo a large translation, which costs digits.
 struct Scene {
     Options opt;
     std::vector<Model> models;
@@ -218,8 +219,7 @@ static AnyShadow first_pass(const Scene& scene, Picture& picture) {
     const int size = exact ? LightGrid::good_cells(face_count(scene.models)) : opt.shadow_size;
     Camera light = fitted_camera(scene.models, opt.light, opt.up, size);
     if (opt.bias && !exact)
-        light = {lookat(opt.light, {}, opt.up) * translation(-opt.center), projection(0),
-                 translation({.5, .5, 0}) * middle_viewport(size, size)};
+        light = {lookat(opt.light, {}, opt.up), projection(0), translation({.5, .5, 0}) * middle_viewport(size, size)};
     const Receiver receiver{light.object_to_screen()};
     if (exact) {
         picture.grid = LightGrid(scene.models, light, size);
@@ -265,7 +265,7 @@ static void second_pass(const Scene& scene, const AnyShadow& any, Picture& p) {
 
 // How far the picture is from the truth: from the same pass with the shadows that a ray caster finds.
 static std::string report(const Scene& scene, const AnyShadow& any, const Picture& p) {
-    const View view{scene.opt.eye, scene.opt.center, scene.opt.up, scene.opt.width, scene.opt.height};
+    const View view{scene.opt.eye - scene.opt.center, {}, scene.opt.up, scene.opt.width, scene.opt.height};
     const TruthImage truth = cast(RayCaster(scene.models), view, scene.opt.light, scene.opt.threads);
     TGAImage exact(view.width, view.height, TGAImage::RGB);
     draw_colors(scene, TrueShadow{truth}, p.faces, exact);
@@ -352,11 +352,11 @@ static Options parse(int argc, char** argv) {
 static std::vector<Model> load(const Options& opt) {
     std::vector<Model> models;
     for (const auto& path : opt.models) {
-        models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
-        std::vector<std::string> notes = models.back().notes();
-        if (opt.fit && models.back().fit()) notes.push_back("fitted to [-1,1]^3");
-        if (!opt.quiet)
-            for (const std::string& note : notes) std::cerr << "umbra: " << path.string() << ": " << note << '\n';
+        Model& model = models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
+        if (opt.fit) model.fit();
+        model.move(-opt.center);
+        for (const std::string& note : model.notes())
+            if (!opt.quiet) std::cerr << "umbra: " << path.string() << ": " << note << '\n';
     }
     return models;
 }
@@ -368,19 +368,19 @@ static double milliseconds() {
 int main(int argc, char** argv) try {
     const Options opt = parse(argc, argv);
     const double start = milliseconds();
-    const Scene scene{opt, load(opt),
-                      {lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
-                       middle_viewport(opt.width, opt.height)}};
+    const vec3 eye = opt.eye - opt.center;
+    const Scene scene{opt, load(opt), {lookat(eye, {}, opt.up), projection(-1 / norm(eye)), middle_viewport(opt.width, opt.height)}};
     const double loaded = milliseconds();
     Picture picture;
     const AnyShadow shadow = first_pass(scene, picture);
     const double lit = milliseconds();
     second_pass(scene, shadow, picture);
     const double shaded = milliseconds();
+    if (opt.report) std::puts(report(scene, shadow, picture).c_str());
+    const double reported = milliseconds();
     if (picture.shadowbuffer.width()) depth_picture(picture.shadowbuffer).write_tga_file(opt.out / "depth.tga");
     picture.framebuffer.write_tga_file(opt.out / "framebuffer.tga");
     const double written = milliseconds();
-    if (opt.report) std::puts(report(scene, shadow, picture).c_str());
     if (opt.quiet) return 0;
 
     std::string left_out = missing_maps(scene.models);
@@ -388,7 +388,7 @@ int main(int argc, char** argv) try {
     const Counters& c = picture.count;  // a visible pixel is shaded exactly once
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f shadow_bytes "
                 "%zu outside %ld between_samples %ld hidden %ld left_out %s\n", c.triangles, c.shaded, c.shaded,
-                loaded - start, lit - loaded, shaded - lit, written - shaded, picture.shadowbuffer.bytes() + picture.grid.bytes(),
+                loaded - start, lit - loaded, shaded - lit, written - reported, picture.shadowbuffer.bytes() + picture.grid.bytes(),
                 c.outside, c.between_samples, c.covered - c.shaded, left_out.empty() ? "-" : left_out.c_str());
 } catch (const std::invalid_argument& e) {
     std::cerr << "umbra: " << e.what() << " (umbra --help lists the options)\n";

@@ -1240,11 +1240,14 @@ bool Model::fit() {
         }
     }
     const double extent = std::max(largest(low), largest(high));
-    if (extent <= 1) return false;
+    constexpr double pixel = 2 / (.75 * 16384);  // [-1,1] are three quarters of a picture's side
+    const bool invisible = largest(high - low) < pixel && !(low == high);
+    if (extent <= 1 && !invisible) return false;
 
     // First by a power of two, so that the largest coordinate is in [1,2) and nothing overflows. From there on the
-    // numbers are the same whatever power of two the model is multiplied by, and so are their roundings.
-    const double unit = std::scalbn(1., -std::ilogb(extent));
+    // numbers are the same whatever power of two the model is multiplied by, and so are their roundings. (What is denormal
+    // comes out smaller: 2^1023 is the largest power of two.)
+    const double unit = std::scalbn(1., std::min(-std::ilogb(extent), 1023));
     low = low * unit;
     high = high * unit;
     const vec3 sides = high - low;
@@ -1255,7 +1258,12 @@ bool Model::fit() {
         if (side > 0) v = v / side;
         for (int i = 0; i < 3; i++) v[i] = std::clamp(v[i], -1., 1.);  // what no face uses may be anywhere
     }
+    notes_.push_back("fitted to [-1,1]^3");
     return true;
+}
+
+void Model::move(const vec3& by) {
+    for (vec3& v : verts_) v = v + by;
 }
 
 std::string missing_maps(const std::vector<Model>& models) {

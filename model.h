@@ -60,8 +60,11 @@ public:
     const std::vector<Group>& groups() const { return groups_; }
 
     // Moves the centre of the bounding box of the used vertices to the origin and scales uniformly so that its largest
-    // half-side is 1, if the box is not within [-1,1]^3 already. Returns whether it did.
+    // half-side is 1, if the box is not within [-1,1]^3 already or is smaller than a pixel of the largest picture. Returns
+    // whether it did, which is a note.
     bool fit();
+
+    void move(const vec3& by);
 
 private:
     std::vector<vec3> verts_, normals_;

@@ -1050,10 +1050,34 @@ TEST("fit leaves a model within [-1,1]^3 as it is") {
     CHECK(!m.fit());
     CHECK_EQ(text(m.verts()[0]), "-1 -1 -1");
     CHECK_EQ(text(m.verts()[3]), "99 0 0");
-    Model tiny = load("v 1e-30 0 0\nv 2e-30 0 0\nv 0 1e-30 0\nf 1 2 3\n");
-    CHECK(!tiny.fit());
+    Model small = load("v .9 .9 0\nv .9002 .9 0\nv .9 .9001 0\nf 1 2 3\n");
+    CHECK(!small.fit());
+    Model spot = load("v .9 .9 0\nf 1 1 1\n");  // no size could make it larger
+    CHECK(!spot.fit());
     Model none;
     CHECK(!none.fit());
+    CHECK(none.notes().empty());
+}
+
+TEST("fit enlarges what would be smaller than a pixel of the largest picture") {
+    for (const char* s : {"e-5", "e-30", "e-300", "e-320"}) {
+        const std::string e = s;
+        Model m = load("v 1" + e + " 0 0\nv 3" + e + " 0 0\nv 1" + e + " 1" + e + " 0\nf 1 2 3\n");
+        CHECK(m.fit());
+        CHECK_NEAR(norm(m.verts()[0] - vec3{-1, -.5, 0}), 0, e == "e-320" ? 1e-3 : 1e-15);  // denormals have few digits
+        CHECK_NEAR(norm(m.verts()[1] - vec3{1, -.5, 0}), 0, e == "e-320" ? 1e-3 : 1e-15);
+        CHECK_EQ(m.notes().back(), std::string("fitted to [-1,1]^3"));
+        check_invariants(m);
+    }
+    Model speck = load("v .9 .9 0\nv .9001 .9 0\nv .9 .9001 0\nf 1 2 3\n");
+    CHECK(speck.fit());
+}
+
+TEST("move adds to every vertex") {
+    Model m = load("v 1 2 3\nv 4 5 6\nv 7 8 10\nf 1 2 3\n");
+    m.move({-1, -2, 1e6});
+    CHECK_EQ(text(m.verts()[0]), "0 0 1000003");
+    CHECK_EQ(text(m.verts()[2]), "6 6 1000010");
 }
 
 TEST("fit centres the box of the used vertices, and its largest half-side becomes 1") {
@@ -1086,7 +1110,7 @@ TEST("fit gives the same bits for a model scaled by any power of two") {
         for (int k = 0; k < 3; k++) largest = std::max(largest, std::fabs(v[k]));
     CHECK_EQ(largest, 1);
     CHECK(!unscaled.fit());
-    for (const int exponent : {1, 3, 20, 100, 500, 1000, 1021}) {
+    for (const int exponent : {-700, -100, -20, 1, 3, 20, 100, 500, 1000, 1021}) {
         std::vector<vec3> scaled = verts;
         for (vec3& v : scaled) v = v * std::ldexp(1., exponent);
         Model m = load(points(scaled) + faces_text);

@@ -265,7 +265,7 @@ TEST("a bias derived from the slopes makes the foot of a shadow thinner than a t
     double last = 1;
     for (const double h : {.08, .04, .02}) {
         const View under_it{{-6, 1, .3}, {-.5, .3, 0}, {0, 1, 0}, 300, 300};
-        const Theory t = theory_of_derived_bias(caster, under_it, overhead, {h, h}, 8, 2);
+        const Theory t = theory_of_derived_bias(caster, under_it, overhead, {h, h}, 1, 2);
         CHECK(t.floor > 0 && t.floor < last);
         last = .6 * t.floor;  // half, if pixels were points
     }

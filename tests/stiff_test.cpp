@@ -307,7 +307,7 @@ TEST("coordinates: a fitted model scaled by a power of two, not one byte changes
     const Folder f;
     for (const char* method : {"--shadow map ", "--shadow exact ", "--bias 43.34 "}) {
         Outcome first;
-        for (const int k : {1, 2, 10, 60, 127, 512, 1000, 1023}) {
+        for (const int k : {1, 2, 10, 60, 127, 512, 1000, 1023, -14, -20, -127, -1000}) {
             f.write("yard.obj", yard(std::ldexp(1., k)));
             const Outcome o = good(f, small + method + "yard.obj");
             if (k == 1) first = o;
@@ -326,16 +326,26 @@ TEST("coordinates: a fitted model scaled by 1e6, 1e18, 1e38, 1e300") {
     }
 }
 
-// What does not exceed [-1,1]^3 keeps its size: a model that is smaller than a pixel lies between two pixels' centres.
-TEST("coordinates: a model scaled by 1e-6, 1e-30, 1e-300 and to denormals is smaller than a pixel") {
+TEST("coordinates: a fitted model scaled by 1e-6, 1e-30, 1e-300") {
+    const Folder f;
+    for (const double s : {1e-6, 1e-30, 1e-300}) {
+        f.write("yard.obj", yard(s));
+        check_exact(f, small + "yard.obj", 500);
+        check_no_acne(f, small + "yard.obj");
+    }
+}
+
+// Unfitted, it is smaller than a pixel and lies between two pixels' centres.
+TEST("coordinates: unfitted and scaled by 1e-6, 1e-30, 1e-300 and to denormals") {
     const Folder f;
     for (const double s : {1e-6, 1e-30, 1e-300, 1e-310, 1e-320}) {
         f.write("yard.obj", yard(s));
-        for (const char* method : {"--shadow map ", "--shadow exact ", "--bias 43.34 "})
-            for (const char* fit : {"", "--no-fit "}) {
-                good(f, small + method + fit + "yard.obj");
-                CHECK_EQ(drawn(f), 0);
-            }
+        for (const char* method : {"--shadow map ", "--shadow exact ", "--bias 43.34 "}) {
+            good(f, small + method + "--no-fit yard.obj");
+            CHECK_EQ(drawn(f), 0);
+            good(f, small + method + "yard.obj");
+            CHECK(drawn(f) > 500);
+        }
     }
 }
 
@@ -376,21 +386,21 @@ TEST("coordinates: one axis scaled by 1e6 and 1e-6") {
         }
 }
 
-// All coordinates below are exact, so the scene is the same one. Rounding begins in the matrices, at 2^-52 of the distance:
-// the corners move by less than 1e-4 pixel at 1e9.
-TEST("coordinates: model and camera moved together by 1e2 to 1e9") {
+// Moves by powers of two are exact as long as the corners' eighths are: then not one byte changes, since everything is
+// computed relative to center. From 1e15 on the eighths are no doubles.
+TEST("coordinates: model and camera moved together by 1e2 to 5e14") {
     const Folder f;
-    f.write("yard.obj", yard());
-    const std::string scene = small + "--light 1,1,.5 --no-fit yard.obj ";
-    good(f, scene + "--eye 1.1,1.3,4");
-    const long at_home = drawn(f);
-    for (const double d : {1e2, 1e4, 1e6, 1e9}) {
-        const vec3 by{d, d / 2, -d};
-        f.write("yard.obj", yard({1, 1, 1}, by));
-        const std::string view = "--center " + triple(by) + " --eye " + triple(by + vec3{1.125, 1.25, 4}) + " ";
-        check_exact(f, scene + view, 500);
-        check_no_acne(f, scene + view);
-        CHECK(std::labs(drawn(f) - at_home) < 100);
+    for (const char* method : {"--shadow map ", "--shadow exact ", "--bias 43.34 "}) {
+        const std::string scene = small + method + "--light 1,1,.5 --no-fit yard.obj ";
+        f.write("yard.obj", yard());
+        const Outcome home = good(f, scene + "--eye 1.125,1.25,4");
+        CHECK(drawn(f) > 500);
+        for (const double d : {1e2, 1e4, 1e6, 1e9, 1e12, 5e14}) {
+            const vec3 by{d, d / 2, -d};
+            f.write("yard.obj", yard({1, 1, 1}, by));
+            const Outcome o = good(f, scene + "--center " + triple(by) + " --eye " + triple(by + vec3{1.125, 1.25, 4}));
+            CHECK(o.frame == home.frame && o.depth == home.depth);
+        }
     }
 }
 
@@ -404,6 +414,17 @@ TEST("coordinates: vertices that are no numbers, or beyond the range of a double
         CHECK_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1);
         CHECK(o.frame.empty());
     }
+}
+
+// The ray caster's products of six coordinates need them below 1e40.
+TEST("coordinates: a report on what is beyond 1e40 is an error, and earlier pictures stay") {
+    const Folder f;
+    f.write("yard.obj", yard(1e41));
+    const Outcome o = run(f, small + "--report --no-fit --eye 1e41,1e41,4e41 yard.obj");
+    CHECK_EQ(o.status, 1);
+    CHECK_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1);
+    CHECK(o.frame.empty() && o.depth.empty());
+    CHECK_EQ(run(f, small + "--report yard.obj").status, 0);
 }
 
 TEST("coordinates: texture coordinates of any size") {

@@ -421,7 +421,7 @@ RayCaster::RayCaster(std::vector<Triangle> triangles) {
         for (const vec3& v : triangle)
             for (int i = 0; i < 3; i++)
                 if (!(std::fabs(v[i]) <= 1e40))
-                    throw std::invalid_argument("a coordinate is not finite or beyond 1e40");
+                    throw std::runtime_error("the truth is known up to 1e40, and a coordinate is not finite or beyond");
     if (triangles.empty()) return;
     const Builder builder(triangles, nodes_);
     position_.resize(triangles.size());

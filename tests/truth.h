@@ -40,7 +40,7 @@ struct Hit {
 class RayCaster {
 public:
     // Copies the triangles and sorts them into a bounding volume hierarchy.
-    // Throws std::invalid_argument for a coordinate that is not finite or beyond 1e40.
+    // Throws std::runtime_error for a coordinate that is not finite or beyond 1e40.
     explicit RayCaster(std::span<const Model> models);
     explicit RayCaster(std::vector<Triangle> triangles);
 
