@@ -2,18 +2,11 @@
 #include "check.h"
 #include "files.h"
 #include "our_gl.h"
+#include "random.h"
 
 #include <fstream>
-#include <random>
 
 namespace {
-
-struct Random {
-    std::mt19937 rng;
-    explicit Random(unsigned seed) : rng(seed) {}
-    double in(double a, double b) { return a + (b - a) * (static_cast<double>(rng()) / 4294967295.); }
-    vec3 point(double r) { return {in(-r, r), in(-r, r), in(-r, r)}; }
-};
 
 // Three corners a face.
 Model model_of(const std::vector<vec3>& corners) {

@@ -1,17 +1,10 @@
 // our_gl_test.cpp: cameras, clipping, interpolation, the z-buffer, threads.
 #include "check.h"
 #include "our_gl.h"
+#include "random.h"
 
-#include <random>
 
 namespace {
-
-struct Random {
-    std::mt19937 rng;
-    explicit Random(unsigned seed) : rng(seed) {}
-    double in(double a, double b) { return a + (b - a) * (static_cast<double>(rng()) / 4294967295.); }
-    vec3 point(double r) { return {in(-r, r), in(-r, r), in(-r, r)}; }
-};
 
 // The faces are given in clip space; a fragment shows its face, or its barycentric coordinates.
 struct ClipShader final : IShader {

@@ -1,19 +1,18 @@
 // report.cpp: error against run time, for each way of computing the shadow. It runs the program that it judges, as a
-// child: with --report for the errors, several times without for the times. It prints a table and what theory says, and
-// writes report.csv and report.svg. See README, "Error against time".
+// child: with --report for the errors, several times without for the times. It prints a table, what theory says, and how
+// far stiff cases can be driven; it writes report.csv, stiffness.csv and report.svg.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
-#include <map>
-#include <sstream>
 #include <thread>
 
 #include "chart.h"
-#include "files.h"
 #include "model.h"
 #include "prediction.h"
+#include "program.h"
+#include "stiffness.h"
 
 namespace {
 
@@ -27,9 +26,9 @@ struct Options {
 constexpr const char* usage_text = R"(usage: report [options] [model.obj ...]
 
 Prints acne, leak, error, RMSE, milliseconds and bytes of each shadow method at each size of its buffer, and what
-theory says of the error; writes report.csv and report.svg. Several models share one scene. Without a model: the idol.
+theory says of the error; and the errors of stiff cases. Writes report.csv, stiffness.csv and report.svg. Several models share one scene. Without a model: the idol.
 
-  -o DIR             folder of the two files (.)
+  -o DIR             folder of the three files (.)
   --rounds N         runs of each for the times, in turn; the median counts (5)
   --threads N        of the program that is measured (1)
   --eye X,Y,Z        the viewer (1,1,4)
@@ -86,52 +85,13 @@ Options parse(int argc, char** argv) {
 
 // ---- the program that is judged ----
 
-std::string quoted(const std::string& argument) {  // for a POSIX shell
-    std::string out = "'";
-    for (const char c : argument) out += c == '\'' ? "'\\''" : std::string(1, c);
-    return out + "'";
-}
-
-class Umbra {
-public:
-    explicit Umbra(const Options& opt) : opt_(opt), folder_("report") {}
-
-    // Runs it and returns what it says, value by name. Throws std::runtime_error where it fails or says nothing of use.
-    std::map<std::string, double> run(const std::string& arguments) const {
-        const std::filesystem::path said = folder_ / "said", complained = folder_ / "complained";
-        std::string command = quoted(UMBRA_BINARY) + " -o " + quoted(folder_.path().string()) + " " + arguments;
-        if (!opt_.eye.empty()) command += " --eye " + quoted(opt_.eye);
-        if (!opt_.light.empty()) command += " --light " + quoted(opt_.light);
-        for (const std::string& model : opt_.models) command.append(" ").append(quoted(model));
-        if (std::system((command + " >" + quoted(said.string()) + " 2>" + quoted(complained.string())).c_str()) != 0)
-            throw std::runtime_error("failed: " + command + "\n" + contents(complained));
-        std::map<std::string, double> values;
-        std::istringstream lines(contents(said));
-        for (std::string line; std::getline(lines, line);) {  // name value name value ...
-            std::istringstream words(line);
-            for (std::string name, value; words >> name >> value;) {
-                char* end = nullptr;
-                const double number = std::strtod(value.c_str(), &end);
-                if (*end == 0) values[name] = number;
-            }
-        }
-        return values;
-    }
-    std::string threads() const { return " --threads " + std::to_string(opt_.threads); }
-
-private:
-    static std::string contents(const std::filesystem::path& path) {
-        const Bytes bytes = read_bytes(path);
-        return {bytes.begin(), bytes.end()};
-    }
-    const Options& opt_;
-    TemporaryFolder folder_;
-};
-
-double value_of(const std::map<std::string, double>& values, const std::string& name) {
-    const auto v = values.find(name);
-    if (v == values.end()) throw std::runtime_error("umbra does not say " + name);
-    return v->second;
+// The viewer, the light and the models, as arguments.
+std::string scene_of(const Options& opt) {
+    std::string arguments;
+    if (!opt.eye.empty()) arguments.append(" --eye ").append(quoted(opt.eye));
+    if (!opt.light.empty()) arguments.append(" --light ").append(quoted(opt.light));
+    for (const std::string& model : opt.models) arguments.append(" ").append(quoted(model));
+    return arguments;
 }
 
 struct Configuration {
@@ -170,8 +130,8 @@ double median(std::vector<double> values) {
     return values.size() % 2 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-Figures measure_error(const Umbra& umbra, const Configuration& c) {
-    const auto said = umbra.run("--report " + c.arguments());
+Figures measure_error(const Program& umbra, const Options& opt, const Configuration& c) {
+    const Values said = umbra.run("--report " + c.arguments() + scene_of(opt));
     Figures f;
     f.method = c.name();
     f.size = c.size;
@@ -187,16 +147,17 @@ Figures measure_error(const Umbra& umbra, const Configuration& c) {
 }
 
 // All configurations in turn, round after round: what slows the machine down for a while slows all of them.
-void measure_times(const Umbra& umbra, const std::vector<Configuration>& configurations, int rounds,
+void measure_times(const Program& umbra, const Options& opt, const std::vector<Configuration>& configurations,
                    std::vector<Figures>& figures) {
     struct Times {
         std::vector<double> depth, shade, total;
     };
     std::vector<Times> times(configurations.size());
-    for (int round = 0; round < rounds; round++) {
-        std::cerr << "report: times, round " << round + 1 << " of " << rounds << '\n';
+    for (int round = 0; round < opt.rounds; round++) {
+        std::cerr << "report: times, round " << round + 1 << " of " << opt.rounds << '\n';
         for (std::size_t i = 0; i < configurations.size(); i++) {
-            const auto said = umbra.run(configurations[i].arguments() + umbra.threads());
+            const std::string threads = " --threads " + std::to_string(opt.threads);
+            const Values said = umbra.run(configurations[i].arguments() + threads + scene_of(opt));
             const double depth = value_of(said, "depth_ms"), shade = value_of(said, "shade_ms");
             times[i].depth.push_back(depth), times[i].shade.push_back(shade), times[i].total.push_back(depth + shade);
         }
@@ -208,7 +169,7 @@ void measure_times(const Umbra& umbra, const std::vector<Configuration>& configu
 
 // ---- theory ----
 
-void predict_errors(const Options& opt, const Umbra& umbra, const std::vector<Configuration>& configurations,
+void predict_errors(const Program& umbra, const Options& opt, const std::vector<Configuration>& configurations,
                     std::vector<Figures>& figures) {
     std::vector<Model> models;
     for (const std::string& path : opt.models) models.emplace_back(path), models.back().fit();
@@ -238,7 +199,7 @@ void predict_errors(const Options& opt, const Umbra& umbra, const std::vector<Co
                                                       fitted_texel(caster, to_light, view.up, c.size), needles, threads);
         const std::string fine = "--size " + std::to_string(fine_side) + "x" + std::to_string(fine_side) +
                                  " --threads " + std::to_string(threads);
-        const auto said = umbra.run("--report " + fine + " " + c.arguments());
+        const Values said = umbra.run("--report " + fine + " " + c.arguments() + scene_of(opt));
         const double wrong = value_of(said, "falsely_dark") + value_of(said, "falsely_lit");
         const double facing = std::max(1., value_of(said, "facing"));
         Figures::Prediction p;
@@ -286,6 +247,22 @@ void print_predictions(const std::vector<Figures>& figures) {
     std::printf("%d of %d within %.0f %% of theory from size %d up\n", within, of, 100 * tolerance, tolerated_from);
 }
 
+void print_stiffness(const std::vector<StiffRow>& rows) {
+    std::puts("\nStiff and extreme cases: the error as each grows, and the step where it is more than it may be.");
+    std::string family;
+    for (const StiffRow& row : rows) {
+        if (row.family != family) {
+            std::printf("\n%-34s", (family = row.family).c_str());
+            for (const StiffRow::Step& s : row.steps) std::printf(" %8.3g", s.stiffness);
+            std::puts("");
+        }
+        std::printf("  %-32s", row.measure.c_str());
+        for (const StiffRow::Step& s : row.steps) std::printf(" %8.2g", s.error);
+        if (row.breaks()) std::printf("  breaks at %g", row.breaks()->stiffness);
+        std::puts("");
+    }
+}
+
 void write(const std::filesystem::path& path, const std::string& text) {
     write_bytes(path, Bytes(text.begin(), text.end()));
 }
@@ -302,7 +279,7 @@ std::string joined_names(const std::vector<std::string>& models) {
 int main(int argc, char** argv) try {
     const Options opt = parse(argc, argv);
     std::filesystem::create_directories(opt.out);
-    const Umbra umbra(opt);
+    const Program umbra(UMBRA_BINARY);
     using Kind = Configuration::Kind;
     std::vector<Configuration> configurations;
     for (const Kind kind : {Kind::map, Kind::constant})
@@ -313,20 +290,24 @@ int main(int argc, char** argv) try {
     std::vector<Figures> figures;
     for (const Configuration& c : configurations) {
         std::cerr << "report: errors of " << c.name() << ' ' << (c.size ? std::to_string(c.size) : "") << '\n';
-        figures.push_back(measure_error(umbra, c));
+        figures.push_back(measure_error(umbra, opt, c));
     }
-    measure_times(umbra, configurations, opt.rounds, figures);
-    predict_errors(opt, umbra, configurations, figures);
+    measure_times(umbra, opt, configurations, figures);
+    predict_errors(umbra, opt, configurations, figures);
     mark_frontier(figures);
+
+    const std::vector<StiffRow> stiff = measure_stiffness(umbra);
 
     print_table(figures);
     print_predictions(figures);
+    print_stiffness(stiff);
     const std::string title = "Shadow error against time: " + joined_names(opt.models);
     const std::string subtitle = std::to_string(picture_side) + " x " + std::to_string(picture_side) + " pixels, " +
                                  std::to_string(opt.threads) + (opt.threads == 1 ? " thread" : " threads") +
                                  ", median of " + std::to_string(opt.rounds) +
                                  " runs. Numbers at the marks: texels a side of the shadow buffer.";
     write(opt.out / "report.csv", csv(figures));
+    write(opt.out / "stiffness.csv", csv(stiff));
     write(opt.out / "report.svg", svg(figures, title, subtitle));
     return 0;
 } catch (const std::invalid_argument& e) {

@@ -199,9 +199,9 @@ TEST("a fitted texel is a share of what the light sees") {
 TEST("needles measure the boundary of a round shadow, on a flat floor cut into few squares or many") {
     for (const int n : {1, 60}) {
         const RayCaster caster(disk_over(floor_mesh(n, 0)));
-        const Theory t = theory_of_derived_bias(caster, from_above, light, {.03, .03}, 16, 2);
+        const Theory t = theory_of_derived_bias(caster, from_above, light, {.03, .03}, 8, 2);
         CHECK_EQ(t.floor, 0);
-        CHECK(t.deviation < .02 * circle_per_area);
+        CHECK(t.deviation < .03 * circle_per_area);
         CHECK_NEAR(t.boundary_per_area, circle_per_area, 4 * t.deviation);
         CHECK_NEAR(t.wrong(), nearest_texel_error * .03 * t.boundary_per_area, 1e-15);
     }
@@ -239,19 +239,21 @@ TEST("the predicted error is the one that a buffer makes") {
     constexpr double h = .15;  // 34 texels along the shadow's boundary
     std::mt19937 random(71);
     const auto in = [&](double most) { return most * static_cast<double>(random()) / 4294967296.; };
+    std::vector<vec3> points;
+    for (int py = 0; py < from_above.height; py++)
+        for (int px = 0; px < from_above.width; px++)
+            points.push_back(caster.first_hit(from_above.eye, from_above.direction(px, py))->point);
     double percent = 0;
     constexpr int buffers = 20;
     for (int i = 0; i < buffers; i++) {  // each with its texels elsewhere, turned otherwise
         const double angle = in(pi), u0 = in(1), v0 = in(1);
         const vec3 u = x * std::cos(angle) + y * std::sin(angle), v = cross(l, u);
         std::vector<std::uint8_t> lit;
-        for (int py = 0; py < from_above.height; py++)
-            for (int px = 0; px < from_above.width; px++) {
-                const vec3 point = caster.first_hit(from_above.eye, from_above.direction(px, py))->point;
-                const double s = dot(point, u) / h + u0, r = dot(point, v) / h + v0;
-                const vec3 texel = point + u * ((std::floor(s) + .5 - s) * h) + v * ((std::floor(r) + .5 - r) * h);
-                lit.push_back(!caster.occluded(texel, l, .1));
-            }
+        for (const vec3& point : points) {
+            const double s = dot(point, u) / h + u0, r = dot(point, v) / h + v0;
+            const vec3 texel = point + u * ((std::floor(s) + .5 - s) * h) + v * ((std::floor(r) + .5 - r) * h);
+            lit.push_back(!caster.occluded(texel, l, .1));
+        }
         percent += compare(truth, lit).percent() / buffers;
     }
     CHECK_NEAR(percent / (100 * nearest_texel_error * h * t.boundary_per_area), 1, .04);

@@ -3,12 +3,12 @@
 #include "check.h"
 #include "files.h"
 #include "our_gl.h"
+#include "random.h"
 #include "tgaimage.h"
 
 #include <algorithm>
 #include <cstdlib>
 #include <map>
-#include <random>
 #include <sstream>
 #include <string>
 
@@ -192,12 +192,6 @@ Drawing drawing(const std::vector<vec4>& clip, int width, int height) {
     return drawing(static_cast<int>(clip.size() / 3), width, height, viewport(0, 0, width, height),
                    [&](int face, int i) { return clip[static_cast<std::size_t>(face * 3 + i)]; });
 }
-
-struct Random {
-    std::mt19937 rng;
-    explicit Random(unsigned seed) : rng(seed) {}
-    double in(double a, double b) { return a + (b - a) * (static_cast<double>(rng()) / 4294967295.); }
-};
 
 }  // namespace
 
@@ -413,6 +407,38 @@ TEST("coordinates: vertices that are no numbers, or beyond the range of a double
         CHECK(o.err.rfind("umbra: bad.obj:3: ", 0) == 0);
         CHECK_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1);
         CHECK(o.frame.empty());
+    }
+}
+
+// The idol with its maps, moved and scaled before it is fitted. Rounding moves its corners by 1e-10, which decides perhaps
+// a pixel on a silhouette or on a shadow's edge.
+TEST("coordinates: shadow and shading errors of a model moved by 1e6 and scaled by 1e6 and 1e-6") {
+    const Folder f;
+    const fs::path obj = UMBRA_OBJ_DIR "/idol";
+    for (const auto& entry : fs::directory_iterator(obj))
+        if (entry.path().extension() != ".obj") fs::create_symlink(entry.path(), f / entry.path().filename().string());
+    const auto idol = [&](double scale, double by) {
+        std::ifstream in(obj / "idol.obj");
+        std::string text;
+        for (std::string line; std::getline(in, line);) {
+            vec3 v;
+            if (std::sscanf(line.c_str(), "v %lf %lf %lf", &v.x, &v.y, &v.z) == 3)
+                line = "v " + number(v.x * scale + by) + ' ' + number(v.y * scale + by) + ' ' + number(v.z * scale - by);
+            text += line + '\n';
+        }
+        f.write("idol.obj", text);
+    };
+    for (const char* method : {"--shadow map ", "--shadow exact "}) {
+        const std::string scene = std::string(method) + "--size 200x200 --shadow-size 400 idol.obj";
+        idol(2, 0);  // fitted, as those below are
+        const Figures home = report(f, scene);
+        CHECK(home.at("facing") > 5000);
+        for (const auto& [scale, by] : {std::pair(1e6, 0.), std::pair(1e-6, 0.), std::pair(2., 1e6)}) {
+            idol(scale, by);
+            const Figures there = report(f, scene);
+            for (const char* name : {"coverage", "facing", "falsely_dark", "falsely_lit", "self"}) CHECK_NEAR(there.at(name), home.at(name), 2);
+            CHECK_NEAR(there.at("rmse"), home.at("rmse"), .05);
+        }
     }
 }
 
@@ -676,6 +702,19 @@ TEST("shadow: light edge-on and from behind leaves a single-sided floor at the a
         }
 }
 
+// A light is a direction: where on its ray one takes it to be, even within a wall, is the same.
+TEST("shadow: the light inside the model") {
+    const Folder f;
+    f.write("yard.obj", yard());
+    for (const char* method : {"--shadow map ", "--shadow exact ", "--bias 43.34 "}) {
+        const Outcome far = good(f, small + method + "--light 1.5,.5,1 yard.obj");
+        for (const char* inside : {".375,.125,.25", ".1875,.0625,.125", "-0.0000015,-0.0000005,-0.000001"}) {
+            const Outcome o = good(f, small + method + "--light " + inside + " yard.obj");
+            CHECK((o.frame == far.frame && o.depth == far.depth) == (*inside != '-'));
+        }
+    }
+}
+
 TEST("shadow: casters outside of the camera's view") {
     const Folder f;
     Obj obj;  // a floor, and a board 100 above it that shadows all of it
@@ -722,6 +761,22 @@ TEST("shadow: a buffer of 16384x16384") {  // 1 GiB
     const std::string exact = good(f, "--size 60x60 --shadow exact yard.obj").frame;
     CHECK(drawn(f) > 500);
     CHECK(good(f, "--size 60x60 --shadow-size 16384 yard.obj").frame == exact);
+}
+#endif
+
+// The z-buffer, the faces' numbers and the picture are 11 bytes a pixel, 2816 MiB; nothing else grows with the picture.
+#if !defined(UMBRA_SANITIZED) && defined(__linux__)
+TEST("pictures: 16384x16384 within its memory") {
+    const Folder f;
+    f.write("yard.obj", yard());
+    const std::string limit = "ulimit -v " + std::to_string(2816 * 1024 + 128 * 1024) + " && ";  // KiB; 128 MiB for all else
+    const auto limited = [&](const std::string& arguments) {
+        return std::system((limit + "\"" UMBRA_BINARY "\" --quiet --threads 2 --shadow-size 256 -o \"" + f.path().string() + "\" " + arguments +
+                            " \"" + (f / "yard.obj").string() + "\"").c_str());
+    };
+    CHECK_EQ(limited("--size 16384x16384"), 0);
+    CHECK_EQ(fs::file_size(f / "framebuffer.tga") > 1000000, true);
+    fs::remove(f / "framebuffer.tga");
 }
 #endif
 

@@ -2,20 +2,13 @@
 // its way to the screen; and coverage agrees with a reference that tests every pixel by itself.
 #include "check.h"
 #include "our_gl.h"
+#include "random.h"
 
 #include <array>
-#include <random>
 
 namespace {
 
 constexpr int W = 64, H = 48;
-
-struct Random {
-    std::mt19937 rng;
-    explicit Random(unsigned seed) : rng(seed) {}
-    double in(double a, double b) { return a + (b - a) * (static_cast<double>(rng()) / 4294967295.); }
-    int below(int n) { return static_cast<int>(rng() % static_cast<unsigned>(n)); }
-};
 
 struct Hits {
     std::vector<int> n = std::vector<int>(W * H);

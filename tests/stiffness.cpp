@@ -1,0 +1,252 @@
+// stiffness.cpp: the scenes and the matrices of the report's second table.
+#include "stiffness.h"
+
+#include <cmath>
+#include <functional>
+#include <iostream>
+
+#include "our_gl.h"
+
+namespace {
+
+std::string number(double x) {
+    std::ostringstream out;
+    out.precision(17);
+    out << x;
+    return out.str();
+}
+std::string triple(const vec3& v) { return number(v.x) + "," + number(v.y) + "," + number(v.z); }
+
+// ---- scenes ----
+
+class Scene {
+public:
+    void polygon(const std::vector<vec3>& corners) {
+        std::string face = "f";
+        for (const vec3& v : corners) {
+            text_ += "v " + number(v.x) + ' ' + number(v.y) + ' ' + number(v.z) + '\n';
+            face += ' ' + std::to_string(++n_);
+        }
+        text_ += face + '\n';
+    }
+    void box(const vec3& a, const vec3& b) {
+        const auto at = [&](int x, int y, int z) { return vec3{x ? b.x : a.x, y ? b.y : a.y, z ? b.z : a.z}; };
+        polygon({at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)});
+        polygon({at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)});
+        polygon({at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)});
+        polygon({at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0)});
+        polygon({at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0)});
+        polygon({at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)});
+    }
+    std::string file(const Program& umbra) const {
+        const std::filesystem::path path = umbra.folder() / "scene.obj";
+        write_bytes(path, Bytes(text_.begin(), text_.end()));
+        return path.string();
+    }
+
+private:
+    std::string text_;
+    int n_ = 0;
+};
+
+// A floor, a wall and a floating block, their corners at multiples of 1/8.
+Scene yard(const vec3& scale) {
+    Scene scene;
+    const auto s = [&](double x, double y, double z) { return vec3{x * scale.x, y * scale.y, z * scale.z}; };
+    scene.box(s(-1, -.625, -1), s(1, -.5, 1));
+    scene.box(s(-.5, -.5, -.5), s(-.25, .5, .5));
+    scene.box(s(.125, 0, 0), s(.5, .25, .5));
+    return scene;
+}
+Scene yard(double scale) { return yard(vec3{scale, scale, scale}); }
+
+// [-1,1]^2 at y = 0, seen from above, in n x n squares.
+Scene floor_of(int n) {
+    Scene scene;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            const auto at = [&](int a, int b) { return vec3{2. * a / n - 1, 0, 1 - 2. * b / n}; };
+            scene.polygon({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
+        }
+    return scene;
+}
+
+// 60 needles around the middle, of a length of 1.6.
+Scene needles(double length_to_width) {
+    Scene scene;
+    for (int i = 0; i < 60; i++) {
+        const double angle = .1 + .05 * i, z = .01 * i;
+        const vec3 along{.8 * std::cos(angle), .8 * std::sin(angle), 0}, across{-along.y, along.x, 0};
+        const vec3 at{0, 0, z};
+        scene.polygon({at - along, at + along - across / length_to_width, at + along + across / length_to_width});
+    }
+    return scene;
+}
+
+constexpr const char* picture = "--report --size 400x400 ";
+
+// Pixels that are wrong with exact shadows: by what is covered or by what is shadowed.
+double wrong_pixels(const Program& umbra, const std::string& arguments) {
+    const Values v = umbra.run(picture + ("--shadow exact " + arguments));
+    return value_of(v, "coverage") + value_of(v, "falsely_dark") + value_of(v, "falsely_lit");
+}
+
+// ---- matrices, in any arithmetic ----
+
+template <class T>
+mat<4, 4, T> in(const mat4& m) {
+    mat<4, 4, T> out;
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) out[i][j] = static_cast<T>(m[i][j]);
+    return out;
+}
+template <class T>
+vec<3, T> in(const vec3& v) {
+    return {static_cast<T>(v.x), static_cast<T>(v.y), static_cast<T>(v.z)};
+}
+
+// The lookat of the lesson as it should be, for views that are not along the y axis.
+template <class T>
+mat<4, 4, T> view_matrix(const vec<3, T>& eye, const vec<3, T>& center) {
+    const vec<3, T> z = normalized(eye - center), x = normalized(cross(vec<3, T>{0, 1, 0}, z)), y = cross(z, x);
+    const mat<4, 4, T> rotation{{direction(x), direction(y), direction(z), {0, 0, 0, 1}}};
+    mat<4, 4, T> move = mat<4, 4, T>::identity();
+    for (int i = 0; i < 3; i++) move[i][3] = -center[i];
+    return rotation * move;
+}
+
+constexpr int size = 800;
+const vec3 to_light{1, 1, .5};
+
+// A scene of corners around center, and how far the two ways from there to the light's screen are off, in pixels.
+struct Corners {
+    vec3 center, eye;
+    std::vector<vec3> at;
+
+    Corners(const vec3& center_, const vec3& from_center) : center(center_), eye(center_ + from_center) {
+        for (int i = 0; i < 343; i++)
+            at.push_back(center + vec3{i % 7 / 4. - .75, i / 7 % 7 / 4. - .75, i / 49 / 4. - .75});
+    }
+
+    template <class T>
+    mat<4, 4, T> light() const {  // the lesson's camera of the light, the viewport apart
+        return view_matrix(in<T>(center) + in<T>(to_light), in<T>(center));
+    }
+    vec<3, long double> exact(const vec3& corner) const {
+        using real = long double;
+        const mat<4, 4, real> rotation = view_matrix(in<real>(to_light), {});
+        return project(in<real>(middle_viewport(size, size)) * (rotation * point(in<real>(corner) - in<real>(center))));
+    }
+    static double off(const vec3& p, const vec<3, long double>& q) {
+        const double d = static_cast<double>(std::hypot(static_cast<long double>(p.x) - q.x, static_cast<long double>(p.y) - q.y));
+        return std::isfinite(d) ? d : size;
+    }
+
+    // The lesson's: from the viewer's screen back through the inverse of its matrices, all in float.
+    double classic() const {
+        const auto viewport = in<float>(middle_viewport(size, size));
+        const auto viewer = viewport * in<float>(projection(-1 / norm(eye - center))) * view_matrix(in<float>(eye), in<float>(center));
+        const auto back = invert(viewer);
+        if (!back) return size;
+        const auto Mshadow = viewport * light<float>() * *back;
+        double worst = 0;
+        for (const vec3& corner : at) {
+            const auto screen = project(viewer * point(in<float>(corner)));
+            const auto p = project(Mshadow * point(screen));
+            worst = std::max(worst, off({double{p.x}, double{p.y}, 0}, exact(corner)));
+        }
+        return worst;
+    }
+    // Here: from coordinates relative to center.
+    double umbra() const {
+        const Camera camera{lookat(to_light, {}, {0, 1, 0}), projection(0), middle_viewport(size, size)};
+        const mat4 uniform_Mshadow = camera.object_to_screen();
+        double worst = 0;
+        for (const vec3& corner : at) worst = std::max(worst, off(project(uniform_Mshadow * point(corner - center)), exact(corner)));
+        return worst;
+    }
+};
+
+}  // namespace
+
+const StiffRow::Step* StiffRow::breaks() const {
+    for (const Step& s : steps)
+        if (!(s.error <= bearable)) return &s;
+    return nullptr;
+}
+
+std::vector<StiffRow> measure_stiffness(const Program& umbra) {
+    std::vector<StiffRow> rows;
+    const auto family = [&](const std::string& name, const std::string& measure, double bearable,
+                            const std::vector<double>& steps, const std::function<double(double)>& error) {
+        std::cerr << "report: " << name << ": " << measure << '\n';
+        rows.push_back({name, measure, bearable});
+        for (const double s : steps) rows.back().steps.push_back({s, error(s)});
+    };
+
+    constexpr double sub_pixel = 1. / 256;  // of what decides a shadow
+    const std::vector<double> distances{1, 1e3, 1e6, 1e9, 1e12, 1e15};
+    const auto moved = [](double d) { return Corners({d, -d / 2, d}, {1, 1, 4}); };
+    family("scene moved away by", "classic Mshadow in float, pixels", sub_pixel, distances, [&](double d) { return moved(d).classic(); });
+    family("scene moved away by", "Mshadow, pixels", sub_pixel, distances, [&](double d) { return moved(d).umbra(); });
+
+    const std::vector<double> eyes{1.2, 1e2, 1e4, 1e6, 1e8};
+    const auto seen_from = [](double d) { return Corners({}, normalized(vec3{1, 1, 4}) * d); };
+    family("eye's distance (1/c)", "classic Mshadow in float, pixels", sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
+    family("eye's distance (1/c)", "Mshadow, pixels", sub_pixel, eyes, [&](double d) { return seen_from(d).umbra(); });
+
+    const std::vector<double> grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
+    const std::string plane = floor_of(1).file(umbra);
+    for (const auto& [method, arguments] : {std::pair("--bias 43.34, falsely dark %", "--bias 43.34"), std::pair("map, falsely dark %", "--shadow map"),
+                                            std::pair("exact, falsely dark %", "--shadow exact")})
+        family("light over a plane at n.l", method, 0, grazing, [&](double n_l) {
+            return value_of(umbra.run(picture + (arguments + (" --light 1," + number(n_l) + ",.3 ") + quoted(plane))), "falsely_dark_percent");
+        });
+
+    family("two layers apart by", "the rear one seen, %", 0, {1e-2, 1e-4, 1e-6, 1.3e-7, 1e-8, 1e-9}, [&](double gap) {
+        struct Layers final : IShader {
+            double gap;
+            vec4 vertex(int face, int corner) override {
+                const double x = corner == 1 ? 3 : -1, y = corner == 2 ? 3 : -1;
+                return {x, y, .577 + .037 * (x + y) + (face ? gap : 0), 1};
+            }
+        };
+        Layers layers;
+        layers.gap = gap;
+        DepthBuffer zbuffer(100, 100);
+        FaceBuffer faces(100, 100);
+        draw_depth(2, layers, viewport(0, 0, 100, 100), zbuffer, &faces, 0, 1);
+        int rear = 0;
+        for (int i = 0; i < 10000; i++) rear += faces.row(i / 100)[i % 100] == 0;
+        return rear / 100.;
+    });
+
+    family("model scaled by", "exact, wrong pixels", 0, {1e-300, 1e-30, 1e-6, 1, 1e6, 1e30, 1e300}, [&](double s) {
+        return wrong_pixels(umbra, quoted(yard(s).file(umbra)));
+    });
+    family("one axis scaled by", "exact, wrong pixels", 0, {1e-9, 1e-6, 1e-3, 1, 1e3, 1e6, 1e9}, [&](double s) {
+        return wrong_pixels(umbra, quoted(yard(vec3{1, 1, s}).file(umbra)));
+    });
+    family("eye this near to center", "exact, wrong pixels", 0, {1e-1, 1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}, [&](double d) {
+        const vec3 center{0, -.25, 0};
+        return wrong_pixels(umbra, "--center " + triple(center) + " --eye " + triple(center + vec3{.25, .125, 1} * d) + " " + quoted(yard(1).file(umbra)));
+    });
+    // Coverage is snapped by up to 2^-17 pixel: 120 long edges of some 400 pixels sweep over 120 * 400 * 2^-17 = .4 pixels'
+    // centres. More than 3 would be a fault (Poisson: one time in 1000).
+    family("needles, length to width", "exact, wrong pixels", 3, {1e1, 1e3, 1e5, 1e7, 1e9}, [&](double ratio) {
+        return wrong_pixels(umbra, "--light .3,.2,1 " + quoted(needles(ratio).file(umbra)));
+    });
+    family("faces a pixel", "exact, wrong pixels", 0, {.02, 2, 10, 50}, [&](double faces) {  // the floor has 71 300 pixels
+        const int n = static_cast<int>(std::lround(std::sqrt(faces * 71300 / 2)));
+        return wrong_pixels(umbra, "--eye 0,4,.001 --light .3,1,.2 " + quoted(floor_of(n).file(umbra)));
+    });
+    return rows;
+}
+
+std::string csv(const std::vector<StiffRow>& rows) {
+    std::ostringstream out;
+    out << "family,measure,stiffness,error\n";
+    for (const StiffRow& row : rows)
+        for (const StiffRow::Step& s : row.steps) out << '"' << row.family << "\",\"" << row.measure << "\"," << s.stiffness << ',' << s.error << '\n';
+    return out.str();
+}
