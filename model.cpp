@@ -823,7 +823,7 @@ struct MtlMaterial {
     };
     vec3 Kd{1, 1, 1};
     std::array<Name, map_count> maps;
-    fs::path library;
+    fs::path mtl;  // the file that it stands in
 };
 using MtlMaterials = std::map<std::string, MtlMaterial, std::less<>>;
 
@@ -919,7 +919,7 @@ void read_mtl(const fs::path& path, MtlMaterials& materials, Notes& notes) {
         if (word == "newmtl") {
             material = &materials[std::string(in.rest())];
             *material = {};
-            material->library = path;
+            material->mtl = path;
             continue;
         }
         static const std::map<std::string, Map, std::less<>> words = {
@@ -1107,13 +1107,13 @@ private:
     };
 
     // The path of a map that can be loaded; else it is empty, with a note.
-    fs::path usable(const MtlMaterial& mtl, const MtlMaterial::Name& name) const {
+    fs::path usable(const MtlMaterial& of, const MtlMaterial::Name& name) const {
         if (name.file.empty()) return {};
         const auto note = [&](const char* what) {
-            notes_.add(mtl.library.filename().string() + ":" + std::to_string(name.line) + ": " + printable(name.file) +
+            notes_.add(of.mtl.filename().string() + ":" + std::to_string(name.line) + ": " + printable(name.file) +
                        what);
         };
-        const fs::path path = beside(mtl.library, name.file);
+        const fs::path path = beside(of.mtl, name.file);
         std::string extension = path.extension().string();
         for (char& c : extension)
             if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
