@@ -126,7 +126,7 @@ struct PhongShader final : IShader {
     const Material& material;
     Shadow shadow;
     int first_number;           // of the model's faces
-    mat4 uniform_M, uniform_P;  // object to eye, eye to clip
+    mat4 uniform_M, uniform_PM;  // object to eye, object to clip
     mat4 uniform_MIT;           // carries normals where uniform_M carries points
     vec3 uniform_l;             // towards the light, unit
 
@@ -136,18 +136,17 @@ struct PhongShader final : IShader {
 
     PhongShader(const Scene& scene, const Model& m, const Material& mat, const Shadow& s, int first)
         : model(m), material(mat), shadow(s), first_number(first), uniform_M(scene.viewer.ModelView),
-          uniform_P(scene.viewer.Projection), uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
+          uniform_PM(scene.viewer.object_to_clip()), uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
           uniform_l(normalized((uniform_M * direction(normalized(scene.opt.light))).xyz())) {}
 
     vec4 vertex(int face, int corner) override {
         const vec3& v = model.vert(face, corner);
-        const vec4 eye = uniform_M * point(v);
         shadow.vertex(first_number + face, corner, v);
         varying_uv[corner] = model.uv(face, corner);
         if constexpr (normals != Normals::object)
             varying_nrm[corner] = (uniform_MIT * direction(model.normal(face, corner))).xyz();
-        if constexpr (normals == Normals::tangent) varying_tri[corner] = eye.xyz();
-        return uniform_P * eye;
+        if constexpr (normals == Normals::tangent) varying_tri[corner] = (uniform_M * point(v)).xyz();
+        return uniform_PM * point(v);  // as in the depth pass, bit for bit: else a pixel on an edge may be left out
     }
 
     vec3 normal(const vec3& bar, const vec2& uv) const {  // unit, at this fragment

@@ -91,11 +91,11 @@ constexpr double guard = 4096;
 
 // Distances to the clipping planes, homogeneous; inside where >= 0. s is a corner in homogeneous screen coordinates.
 struct Planes {
-    double right, top;
+    double near, right, top;
     static constexpr int count = 5;
     double distance(int plane, const vec4& s) const {
         switch (plane) {
-            case 0: return s.w - w_near;
+            case 0: return s.w - near;
             case 1: return s.x + guard * s.w;
             case 2: return right * s.w - s.x;
             case 3: return s.y + guard * s.w;
@@ -106,7 +106,7 @@ struct Planes {
     // thousands of pixels off its plane.
     void put_on(int plane, vec4& s) const {
         switch (plane) {
-            case 0: s.w = w_near; break;
+            case 0: s.w = near; break;
             case 1: s.x = -guard * s.w; break;
             case 2: s.x = right * s.w; break;
             case 3: s.y = -guard * s.w; break;
@@ -127,7 +127,9 @@ int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* o
             const bool a_inside = da >= 0;
             const double d_in = a_inside ? da : db, d_out = a_inside ? db : da;
             const vec4 &p = a_inside ? a : b, &q = a_inside ? b : a;
-            out[m] = p + (q - p) * (d_in / (d_in - d_out));
+            // A mean with positive weights: p + (q - p) t would lose a q that is some 2^53 times smaller than p.
+            const double length = d_in - d_out;
+            out[m] = p * (-d_out / length) + q * (d_in / length);
             planes.put_on(plane, out[m++]);
         }
     }
@@ -142,15 +144,24 @@ Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int
     for (const vec4& p : s)  // a coordinate beyond the range of a double has no place on the screen
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z) || !std::isfinite(p.w)) return Setup::outside;
 
+    // Homogeneous coordinates may be scaled: by a power of two, exactly. Distances to the planes are sums of up to 2^15 times
+    // the coordinates, which must not leave the range of a double.
+    double size = 0, near = w_near;
+    for (const vec4& p : s) size = std::max({size, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), std::fabs(p.w)});
+    if (size > 0x1p1000) {
+        for (vec4& p : s) p = p * 0x1p-40;
+        size *= 0x1p-40, near *= 0x1p-40;
+    }
+
     // Wholly behind the eye or beyond one side of the picture.
     const auto all = [&s](auto&& outside) { return outside(s[0]) && outside(s[1]) && outside(s[2]); };
-    if (all([](const vec4& p) { return !(p.w >= w_near); }) || all([](const vec4& p) { return !(p.x > 0); }) ||
+    if (all([=](const vec4& p) { return !(p.w >= near); }) || all([](const vec4& p) { return !(p.x > 0); }) ||
         all([](const vec4& p) { return !(p.y > 0); }) || all([=](const vec4& p) { return !(p.x < width * p.w); }) ||
         all([=](const vec4& p) { return !(p.y < height * p.w); }))
         return Setup::outside;
 
     // Clip against those planes that a corner is outside of.
-    const Planes planes{width + guard, height + guard};
+    const Planes planes{near, width + guard, height + guard};
     vec4 buffer[2][TriangleSetup::max_corners];
     vec4* polygon = buffer[0];
     std::copy_n(s, 3, polygon);
@@ -194,9 +205,7 @@ Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int
     // coordinates", 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are linear functions
     // on the screen whose ratio is that of the barycentric coordinates on the face. They hold for the whole face, clipped or
     // not, corners behind the eye included. Coordinates relative to a pixel of the face keep the products small.
-    // Homogeneous coordinates may be scaled: by a power of two, exactly, so that no product leaves the range of a double.
-    double size = 0;
-    for (const vec4& p : s) size = std::max({size, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), std::fabs(p.w)});
+    // They are scaled again, so that no product leaves that range either.
     if (!(size > 0x1p-200 && size < 0x1p200))
         for (vec4& p : s)
             for (int i = 0; i < 4; i++) p[i] = std::scalbn(p[i], -std::ilogb(size));

@@ -200,40 +200,60 @@ struct Counters {
     }
 };
 
-// Calls visit(y, x_begin, x_end) for the pixels of a prepared face on the rows [y_begin, y_end) that it touches.
-// The convex polygon is a fan of triangles; nearly always there is one. The edge function of two corners is twice a signed
-// area: positive inside; where it is zero the pixel's centre lies on the edge and belongs to it if the edge is a left one
-// (it runs down, counter-clockwise) or a top one (it runs left), so that of two triangles sharing an edge exactly one owns
-// the pixel. Range: with max_size pixels and the guard band, differences of coordinates are below 2^30.6, edge functions
-// below 2^62.2.
+// Calls visit(y, x_begin, x_end) for the pixels on the rows [y_begin, y_end) of the triangle of corners 0, k-1 and k. The edge
+// function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies on the edge and
+// belongs to it if the edge is a left one (it runs down, counter-clockwise) or a top one (it runs left), so that of two
+// triangles sharing an edge exactly one owns the pixel. Range: with max_size pixels and the guard band, differences of
+// coordinates are below 2^30.6, edge functions below 2^62.2.
+template <class Visit>
+void for_each_span_of_fan(const TriangleSetup& t, int k, int y_begin, int y_end, Visit&& visit) {
+    constexpr std::int64_t one = std::int64_t{1} << TriangleSetup::subpixel_bits, half = one / 2;
+    int corner[3] = {0, k - 1, k};
+    const std::int64_t area = (std::int64_t{t.x[k - 1]} - t.x[0]) * (std::int64_t{t.y[k]} - t.y[0]) -
+                              (std::int64_t{t.y[k - 1]} - t.y[0]) * (std::int64_t{t.x[k]} - t.x[0]);
+    if (area == 0) return;
+    if (area < 0) std::swap(corner[1], corner[2]);
+    std::int64_t row[3], step_x[3], step_y[3];
+    for (int i = 0; i < 3; i++) {
+        const int p = corner[i], q = corner[(i + 1) % 3];
+        const std::int64_t dx = std::int64_t{t.x[q]} - t.x[p], dy = std::int64_t{t.y[q]} - t.y[p];
+        const bool top_left = dy < 0 || (dy == 0 && dx < 0);
+        row[i] = dx * (y_begin * one + half - t.y[p]) - dy * (t.xmin * one + half - t.x[p]) - (top_left ? 0 : 1);
+        step_x[i] = -dy * one;
+        step_y[i] = dx * one;
+    }
+    for (int y = y_begin; y < y_end; y++) {
+        std::int64_t e0 = row[0], e1 = row[1], e2 = row[2];
+        int x = t.xmin;
+        while (x <= t.xmax && (e0 | e1 | e2) < 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
+        const int first = x;
+        while (x <= t.xmax && (e0 | e1 | e2) >= 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
+        if (x > first) visit(y, first, x);
+        for (int i = 0; i < 3; i++) row[i] += step_y[i];
+    }
+}
+
+// Calls visit(y, x_begin, x_end) for the pixels of a prepared face on the rows [y_begin, y_end) that it touches, each once.
+// The polygon is a fan of triangles; nearly always there is one.
 template <class Visit>
 void for_each_span(const TriangleSetup& t, int y_begin, int y_end, Visit&& visit) {
-    constexpr std::int64_t one = std::int64_t{1} << TriangleSetup::subpixel_bits, half = one / 2;
     y_begin = std::max(y_begin, t.ymin);
     y_end = std::min(y_end, t.ymax + 1);
-    for (int k = 2; k < t.corners; k++) {
-        int corner[3] = {0, k - 1, k};
-        const std::int64_t area = (std::int64_t{t.x[k - 1]} - t.x[0]) * (std::int64_t{t.y[k]} - t.y[0]) -
-                                  (std::int64_t{t.y[k - 1]} - t.y[0]) * (std::int64_t{t.x[k]} - t.x[0]);
-        if (area == 0) continue;
-        if (area < 0) std::swap(corner[1], corner[2]);
-        std::int64_t row[3], step_x[3], step_y[3];
-        for (int i = 0; i < 3; i++) {
-            const int p = corner[i], q = corner[(i + 1) % 3];
-            const std::int64_t dx = std::int64_t{t.x[q]} - t.x[p], dy = std::int64_t{t.y[q]} - t.y[p];
-            const bool top_left = dy < 0 || (dy == 0 && dx < 0);
-            row[i] = dx * (y_begin * one + half - t.y[p]) - dy * (t.xmin * one + half - t.x[p]) - (top_left ? 0 : 1);
-            step_x[i] = -dy * one;
-            step_y[i] = dx * one;
-        }
-        for (int y = y_begin; y < y_end; y++) {
-            std::int64_t e0 = row[0], e1 = row[1], e2 = row[2];
-            int x = t.xmin;
-            while (x <= t.xmax && (e0 | e1 | e2) < 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
-            const int first = x;
-            while (x <= t.xmax && (e0 | e1 | e2) >= 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
-            if (x > first) visit(y, first, x);
-            for (int i = 0; i < 3; i++) row[i] += step_y[i];
+    if (t.corners == 3) return for_each_span_of_fan(t, 2, y_begin, y_end, visit);
+    // Snapping and clipping round: a cut polygon may be convex but for a hair, and then its fan overlaps itself.
+    for (int row = y_begin; row < y_end; row++) {
+        std::pair<int, int> spans[TriangleSetup::max_corners];
+        int n = 0;
+        for (int k = 2; k < t.corners; k++)
+            for_each_span_of_fan(t, k, row, row + 1, [&](int, int begin, int end) {
+                int i = n++;  // from left to right
+                for (; i > 0 && spans[i - 1].first > begin; i--) spans[i] = spans[i - 1];
+                spans[i] = {begin, end};
+            });
+        for (int i = 0; i < n;) {
+            auto [begin, end] = spans[i++];
+            for (; i < n && spans[i].first <= end; i++) end = std::max(end, spans[i].second);
+            visit(row, begin, end);
         }
     }
 }

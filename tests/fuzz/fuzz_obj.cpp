@@ -1,0 +1,149 @@
+// fuzz_obj.cpp: any bytes as an .obj with materials and pictures beside it. They are refused in one line or become a
+// model that keeps what model.h promises, within a memory that is a constant times the input.
+//
+// The input is model.obj; a line "=== NAME" in it ends one file and begins another of the names below.
+#include "fuzz.h"
+#include "model.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+constexpr std::array<std::string_view, 8> names = {
+    "model.obj",           "model.mtl",      "model_diffuse.tga", "model_nm.tga",
+    "model_nm_tangent.tga", "model_spec.tga", "model_glow.tga",    "a.tga"};
+
+// Writes the input's files; those that it does not hold do not exist.
+class Files {
+public:
+    void write(std::string_view input) {
+        std::array<std::string_view, names.size()> parts;
+        std::array<bool, names.size()> there{true};
+        for (std::size_t file = 0;;) {
+            const std::size_t newline_before = input.find("\n=== ");  // it belongs to the file that ends
+            const std::size_t end = input.starts_with("=== ")         ? 0
+                                    : newline_before == input.npos ? input.size()
+                                                                   : newline_before + 1;
+            if (end > 0) parts[file] = input.substr(0, end);
+            if (end == input.size()) break;
+            input.remove_prefix(end + 4);
+            const std::size_t newline = std::min(input.find('\n'), input.size());
+            const auto name = std::find(names.begin() + 1, names.end(), input.substr(0, newline));
+            file = name == names.end() ? 1 : static_cast<std::size_t>(name - names.begin());
+            there[file] = true;
+            input.remove_prefix(std::min(newline + 1, input.size()));
+        }
+        for (std::size_t i = 0; i < names.size(); i++) {
+            if (!there[i]) {
+                files_[i].reset();
+                continue;
+            }
+            if (!files_[i]) files_[i] = std::make_unique<ScratchFile>(folder_ / std::string(names[i]));
+            files_[i]->assign(reinterpret_cast<const std::uint8_t*>(parts[i].data()), parts[i].size());
+        }
+    }
+    std::filesystem::path obj() const { return folder_ / std::string(names[0]); }
+
+private:
+    TemporaryFolder folder_{"fuzz_obj"};
+    std::array<std::unique_ptr<ScratchFile>, names.size()> files_;
+};
+
+bool is_finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+bool is_picture(const TGAImage& map, int least_bytes) { return map.empty() || map.bytespp() >= least_bytes; }
+
+std::size_t bytes(const TGAImage& map) {
+    return static_cast<std::size_t>(map.width() * map.bytespp()) * static_cast<std::size_t>(map.height());
+}
+
+void check(const Model& model) {
+    REQUIRE(model.nfaces() >= 1 && model.nverts() >= 1);
+    for (const vec3& v : model.verts()) REQUIRE(is_finite(v));
+    for (int face = 0; face < model.nfaces(); face++) {
+        for (int c = 0; c < 3; c++) {
+            const Model::Corner& corner = model.corner(face, c);
+            REQUIRE(corner.vert >= 0 && corner.vert < model.nverts());
+            REQUIRE(corner.normal >= 0 && corner.uv >= -1);
+            // Three squares, their sum, a root and a quotient are each off by half a unit: the length by less than 4.
+            const vec3 n = model.normal(face, c);
+            REQUIRE(std::fabs(norm(n) - 1) <= 4 * std::numeric_limits<double>::epsilon());
+            const vec2 uv = model.uv(face, c);
+            REQUIRE(std::isfinite(uv.x) && std::isfinite(uv.y));
+        }
+    }
+    // The groups are a partition of the faces, one for each material.
+    int end = 0;
+    std::vector<char> used(model.materials().size());
+    for (const Model::Group& g : model.groups()) {
+        REQUIRE(g.begin == end && g.end > g.begin);
+        end = g.end;
+        REQUIRE(g.material >= 0 && static_cast<std::size_t>(g.material) < used.size());
+        REQUIRE(!used[static_cast<std::size_t>(g.material)]++);
+    }
+    REQUIRE(end == model.nfaces());
+    REQUIRE(std::all_of(used.begin(), used.end(), [](char u) { return u == 1; }));
+    for (const Material& m : model.materials()) {
+        for (int i = 0; i < 3; i++) REQUIRE(m.Kd[i] >= 0 && m.Kd[i] <= 1);
+        REQUIRE(is_picture(m.diffuse, 3) && is_picture(m.normal, 3));
+        REQUIRE(is_picture(m.tangent, 3) && is_picture(m.glow, 3));
+        REQUIRE(m.normal.empty() || m.tangent.empty());
+    }
+    REQUIRE(model.notes().size() <= 21);
+    for (const std::string& note : model.notes()) REQUIRE(is_one_line(note));
+}
+
+// After fit() everything is within [-1,1]^3, the faces touch both of some pair of its sides, and it is done once.
+void check_fit(Model& model) {
+    const bool fitted = model.fit();
+    vec3 low = model.vert(0, 0), high = low;
+    for (int i = 0; i < model.nfaces() * 3; i++) {
+        const vec3& v = model.vert(i / 3, i % 3);
+        for (int k = 0; k < 3; k++) {
+            REQUIRE(v[k] >= -1 && v[k] <= 1);
+            low[k] = std::min(low[k], v[k]), high[k] = std::max(high[k], v[k]);
+        }
+    }
+    if (!fitted) return;
+    for (const vec3& v : model.verts()) REQUIRE(is_finite(v));
+    bool is_point = true, touches = false;
+    for (int k = 0; k < 3; k++) {
+        is_point = is_point && low[k] == high[k];
+        touches = touches || (low[k] == -1 && high[k] == 1);
+    }
+    REQUIRE(is_point || touches);
+    REQUIRE(!model.fit());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    static Files files;
+    // The window of a text file and what little else there is at once. The factor is more than twice what was measured:
+    // 98 for a long polygon (corners, tree, lists), 110 for a path of many folders.
+    static MemoryBound bound(384 << 10, 256);
+    files.write({reinterpret_cast<const char*>(data), size});
+
+    Model model;
+    start_peak();
+    try {
+        model = Model(files.obj(), size % 2 ? NormalMap::object : NormalMap::tangent);
+    } catch (const std::runtime_error& e) {  // of a file by its whole path, and nothing of the library's own
+        const std::string what = e.what();
+        if (!is_one_line(what) || what[0] != '/' || what.find(": ") == what.npos) refuse(what);
+    }
+    std::size_t copies = 0;  // bounded by 1 GiB, not by the size
+    for (const Material& m : model.materials())
+        copies += bytes(m.diffuse) + bytes(m.normal) + bytes(m.tangent) + bytes(m.specular) + bytes(m.glow);
+    bound.check(peak_bytes() - std::min(peak_bytes(), copies), size);
+    if (model.nfaces() == 0) return 0;
+    check(model);
+    check_fit(model);
+    return 0;
+}
