@@ -14,7 +14,9 @@
 #include <barrier>
 #include <cmath>
 #include <cstdint>
+#include <latch>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -302,19 +304,21 @@ Counters for_each_face(int begin, int end, const Shader& shader, const mat4& Vie
     constexpr int block = 4096, least = 256;  // faces set up at a time; faces below which a thread is not worth starting
     threads = std::clamp(threads, 1, std::max(1, (end - begin) / least));
     struct Worker {
-        std::vector<TriangleSetup> setups;
+        TriangleSetup* setups = nullptr;
         std::size_t drawn = 0;
         Counters count;
     };
+    std::vector<TriangleSetup> setups(static_cast<std::size_t>(std::clamp(end - begin, 0, block)));
     std::vector<Worker> workers(static_cast<std::size_t>(threads));
-    std::barrier sync(threads);
+    std::latch ready(1);  // when it is known how many threads there are
+    std::optional<std::barrier<>> sync;
 
-    const auto work = [&](int me) {
+    const auto work = [&](int me) {  // cannot throw
         Worker& mine = workers[static_cast<std::size_t>(me)];
         Shader own = shader;
-        mine.setups.resize(static_cast<std::size_t>(std::min(block, end - begin) / threads + 1));
         for (int from = begin; from < end; from += block) {
             const int n = std::min(block, end - from);
+            mine.setups = setups.data() + n * me / threads;
             mine.drawn = 0;
             for (int i = n * me / threads; i < n * (me + 1) / threads; i++) {
                 const int face = from + i;
@@ -328,14 +332,26 @@ Counters for_each_face(int begin, int end, const Shader& shader, const mat4& Vie
                 mine.count.between_samples += outcome == Setup::between_samples;
                 mine.drawn += outcome == Setup::drawn;
             }
-            sync.arrive_and_wait();
+            sync->arrive_and_wait();
             for (const Worker& w : workers)
                 for (std::size_t i = 0; i < w.drawn; i++) visit(w.setups[i], own, Share{me, threads}, mine.count);
-            sync.arrive_and_wait();
+            sync->arrive_and_wait();
         }
     };
     std::vector<std::jthread> others;
-    for (int i = 1; i < threads; i++) others.emplace_back(work, i);
+    others.reserve(static_cast<std::size_t>(threads - 1));
+    const auto wait_and_work = [&](int me) {
+        ready.wait();
+        work(me);
+    };
+    try {
+        for (int i = 1; i < threads; i++) others.emplace_back(wait_and_work, i);
+    } catch (const std::exception&) {
+        // no more threads to be had: those that run share the work
+    }
+    threads = static_cast<int>(others.size()) + 1;
+    sync.emplace(threads);
+    ready.count_down();
     work(0);
     others.clear();
 

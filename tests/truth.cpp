@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -88,10 +89,13 @@ void for_rows(int height, int threads, const Body& body) {
     const auto work = [&] {
         for (int row = next++; row < height; row = next++) body(row);
     };
-    std::vector<std::thread> others;
-    for (int i = 1; i < std::min(threads, height); i++) others.emplace_back(work);
+    std::vector<std::jthread> others;
+    try {
+        for (int i = 1; i < std::min(threads, height); i++) others.emplace_back(work);
+    } catch (const std::system_error&) {
+        // no more threads to be had: those that run do the work
+    }
     work();
-    for (std::thread& other : others) other.join();
 }
 
 }  // namespace
