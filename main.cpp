@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <iostream>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -94,15 +93,13 @@ struct ShadowMap : Receiver {
         const vec3 p = on_light_screen(f.bar);
         const auto depth = [&](int dx, int dy) { return static_cast<double>(shadowbuffer->at(p.x + dx, p.y + dy)); };
         // The receiver's own plane at the texel's centre: if nothing is above it there, the fragment is lit. So no face
-        // shadows itself, at any angle. Rounding: the depth is a float, and coverage is snapped, so that a centre may be
-        // drawn with a depth of the face up to 2^-16 texel away.
+        // shadows itself, at any angle. Rounding: depths are floats, and coverage is snapped by up to 2^-16 texel.
         const double stored = depth(0, 0);
         const vec2 g = slope(), to_centre{std::floor(p.x) + .5 - p.x, std::floor(p.y) + .5 - p.y};
         const double rounding = depth_rounding + (std::fabs(g.x) + std::fabs(g.y)) / (1 << TriangleSetup::subpixel_bits);
         if (!(stored > p.z + dot(g, to_centre) + rounding)) return true;
-        // What is above it there may be lower here: between centres the buffer knows nothing, so it may be as low as the
-        // next texel. Of an axis' two neighbours the nearer in depth counts, since the other may belong to something else;
-        // where both are lower, on a thin caster, half the way down is as far as the fragment can be.
+        // What is above it there may be as low here as the next texel. Of an axis' two neighbours the nearer in depth
+        // counts, since the other may be something else; between two lower ones, on a thin caster, it is half the way.
         const auto fall = [&](double a, double b) {
             return std::min(std::fabs(stored - a), std::fabs(stored - b)) / (a < stored && b < stored ? 2 : 1);
         };
@@ -113,7 +110,6 @@ struct ShadowMap : Receiver {
 // --shadow exact: no buffer to resolve. The faces that may stand in the way are looked up and tested one by one.
 struct ExactShadow : Receiver {
     const LightGrid* grid;
-
     bool lit(const Fragment& f) const { return !grid->shadows(on_light_screen(f.bar), number); }
 };
 
@@ -310,12 +306,11 @@ static Options parse(int argc, char** argv) {
             if (std::sscanf(value(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most) fail("1 to " + std::to_string(most));
         };
         const auto vector = [&](vec3& v) {
-            if (std::sscanf(value(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(std::fabs(v.x) <= 1e307) ||
-                !(std::fabs(v.y) <= 1e307) || !(std::fabs(v.z) <= 1e307))
-                fail("three numbers X,Y,Z, none beyond 1e307");
+            if (std::sscanf(value(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(norm(v) <= 1e307))
+                fail("three numbers X,Y,Z, a length of at most 1e307");
         };
-        if (arg == "--help") std::exit(std::fputs(usage_text, stdout) < 0);
-        else if (arg == "--version") std::exit(std::puts("umbra " UMBRA_VERSION) < 0);
+        if (arg == "--help") std::exit(std::fputs(usage_text, stdout) < 0 || std::fflush(stdout));
+        else if (arg == "--version") std::exit(std::puts("umbra " UMBRA_VERSION) < 0 || std::fflush(stdout));
         else if (arg == "-o") opt.out = value();
         else if (arg == "--size") {
             int &w = opt.width, &h = opt.height;
@@ -348,6 +343,13 @@ static Options parse(int argc, char** argv) {
     return opt;
 }
 
+// One line on standard error, whatever a name on the command line is made of; returns the status.
+static int complain(std::string what, int status) {
+    std::replace_if(what.begin(), what.end(), [](unsigned char c) { return c < ' ' || c == 127; }, '?');
+    std::fprintf(stderr, "umbra: %s\n", what.c_str());
+    return status;
+}
+
 static std::vector<Model> load(const Options& opt) {
     std::vector<Model> models;
     for (const auto& path : opt.models) {
@@ -355,7 +357,7 @@ static std::vector<Model> load(const Options& opt) {
         if (opt.fit) model.fit();
         model.move(-opt.center);
         for (const std::string& note : model.notes())
-            if (!opt.quiet) std::cerr << "umbra: " << path.string() << ": " << note << '\n';
+            if (!opt.quiet) complain(path.string() + ": " + note, 0);
     }
     return models;
 }
@@ -377,22 +379,21 @@ int main(int argc, char** argv) try {
     const double shaded = milliseconds();
     if (opt.report) std::puts(report(scene, shadow, picture).c_str());
     const double reported = milliseconds();
-    if (picture.shadowbuffer.width()) depth_picture(picture.shadowbuffer).write_tga_file(opt.out / "depth.tga");
-    picture.framebuffer.write_tga_file(opt.out / "framebuffer.tga");
+    std::vector<TGAFile> files;  // both or, where one does not fit on the disk, none
+    if (picture.shadowbuffer.width()) files.emplace_back(depth_picture(picture.shadowbuffer), opt.out / "depth.tga");
+    files.emplace_back(picture.framebuffer, opt.out / "framebuffer.tga");
+    for (TGAFile& file : files) file.commit();
     const double written = milliseconds();
-    if (opt.quiet) return 0;
-
     std::string left_out = missing_maps(scene.models);
     if (opt.shadow == Options::Shadow::off) left_out += left_out.empty() ? "shadow" : ",shadow";
     const Counters& c = picture.count;  // a visible pixel is shaded exactly once
-    std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f shadow_bytes "
-                "%zu outside %ld between_samples %ld hidden %ld left_out %s\n", c.triangles, c.shaded, c.shaded,
-                loaded - start, lit - loaded, shaded - lit, written - reported, picture.shadowbuffer.bytes() + picture.grid.bytes(),
-                c.outside, c.between_samples, c.covered - c.shaded, left_out.empty() ? "-" : left_out.c_str());
-} catch (const std::invalid_argument& e) {
-    std::cerr << "umbra: " << e.what() << " (umbra --help lists the options)\n";
-    return 2;
+    if (!opt.quiet)
+        std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f shadow_bytes %zu "
+                    "outside %ld between_samples %ld hidden %ld left_out %s\n", c.triangles, c.shaded, c.shaded, loaded - start,
+                    lit - loaded, shaded - lit, written - reported, picture.shadowbuffer.bytes() + picture.grid.bytes(), c.outside,
+                    c.between_samples, c.covered - c.shaded, left_out.empty() ? "-" : left_out.c_str());
+    if (std::fflush(stdout) || std::ferror(stdout)) throw std::runtime_error("standard output: cannot write");
 } catch (const std::exception& e) {
-    std::cerr << "umbra: " << e.what() << '\n';
-    return 1;
+    const bool usage = dynamic_cast<const std::invalid_argument*>(&e);
+    return complain(std::string(e.what()) + (usage ? " (umbra --help lists the options)" : ""), usage ? 2 : 1);
 }

@@ -946,6 +946,7 @@ MtlMaterials read_libraries(const fs::path& obj, const std::vector<std::string>&
         const fs::path path = beside(obj, std::string(name));
         std::error_code ignored;
         if (!fs::exists(path, ignored)) return false;
+        if (fs::is_other(path, ignored)) throw std::runtime_error(path.string() + ": is not a file");  // a pipe may never end
         if (seen.insert(path).second) read_mtl(path, materials, notes);
         return true;
     };

@@ -433,53 +433,62 @@ std::array<Byte, header_size> header_of(const TGAImage& image, bool rle) {
 // and a zero byte, the literal's own.
 constexpr char footer[] = "\0\0\0\0\0\0\0\0TRUEVISION-XFILE.";
 
+[[noreturn]] void fail(const fs::path& path, const std::string& why) {
+    throw std::runtime_error(path.string() + ": cannot write: " + why);
+}
+
 }  // namespace
 
-void TGAImage::write_tga_file(const fs::path& path, bool rle) const {
-    const std::string name = path.string();
-    if (empty()) throw std::invalid_argument(name + ": a picture of 0 x 0 pixels cannot be written");
-    const auto fail = [&name](const std::string& why) { throw std::runtime_error(name + ": cannot write: " + why); };
+void TGAImage::write_tga_file(const fs::path& path, bool rle) const { TGAFile(*this, path, rle).commit(); }
+
+TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(path), temporary_{} {
+    if (image.empty()) throw std::invalid_argument(path.string() + ": a picture of 0 x 0 pixels cannot be written");
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
     // Renaming would put the picture in the place of a device.
-    if (fs::exists(status) && !fs::is_regular_file(status)) fail("it is not a regular file");
+    if (fs::exists(status) && !fs::is_regular_file(status)) fail(path, "it is not a regular file");
 
     // A run saves at least the header of the raw packet before it, so that a row takes at most its own bytes and a
     // header for each 128 pixels.
-    const std::size_t row_size = static_cast<std::size_t>(w_) * static_cast<std::size_t>(bpp_);
-    const auto encode = bpp_ == GRAYSCALE ? encode_row<GRAYSCALE> : bpp_ == RGB ? encode_row<RGB> : encode_row<RGBA>;
-    std::vector<Byte> packets(row_size + static_cast<std::size_t>((w_ + longest_packet - 1) / longest_packet));
+    const int w = image.width(), bpp = image.bytespp();
+    const std::size_t row_size = static_cast<std::size_t>(w) * static_cast<std::size_t>(bpp);
+    const auto encode = bpp == TGAImage::GRAYSCALE ? encode_row<TGAImage::GRAYSCALE>
+                        : bpp == TGAImage::RGB     ? encode_row<TGAImage::RGB>
+                                                   : encode_row<TGAImage::RGBA>;
+    std::vector<Byte> packets(row_size + static_cast<std::size_t>((w + longest_packet - 1) / longest_packet));
     std::vector<char> buffer(1 << 16);
 
     fs::path temporary = path;
     temporary += ".part";
     Stream stream = open(temporary, "wb");
-    if (!stream) fail(reason());
-    struct Removal {
-        const fs::path& file;
-        bool wanted = true;
-        ~Removal() {
-            std::error_code ignored;
-            if (wanted) fs::remove(file, ignored);
-        }
-    } removal{temporary};
+    if (!stream) fail(path, reason());
+    temporary_.path = temporary;
 
     std::setvbuf(stream.get(), buffer.data(), _IOFBF, buffer.size());
     const auto write = [&](const void* bytes, std::size_t size) {
         errno = 0;
-        if (std::fwrite(bytes, 1, size, stream.get()) != size) fail(reason());
+        if (std::fwrite(bytes, 1, size, stream.get()) != size) fail(path, reason());
     };
-    const std::array<Byte, header_size> header = header_of(*this, rle);
+    const std::array<Byte, header_size> header = header_of(image, rle);
     write(header.data(), header.size());
-    for (int y = h_ - 1; y >= 0; y--) {
-        const Byte* const row = pixel(0, y);
-        if (rle) write(packets.data(), static_cast<std::size_t>(encode(row, w_, packets.data()) - packets.data()));
+    for (int y = image.height() - 1; y >= 0; y--) {
+        const Byte* const row = image.pixel(0, y);
+        if (rle) write(packets.data(), static_cast<std::size_t>(encode(row, w, packets.data()) - packets.data()));
         else write(row, row_size);
     }
     write(footer, sizeof footer);
     errno = 0;
-    if (std::fclose(stream.release())) fail(reason());  // flushes what is left
-    fs::rename(temporary, path, error);
-    if (error) fail(error.message());
-    removal.wanted = false;
+    if (std::fclose(stream.release())) fail(path, reason());  // flushes what is left
+}
+
+void TGAFile::commit() {
+    std::error_code error;
+    fs::rename(temporary_.path, path_, error);
+    if (error) fail(path_, error.message());
+    temporary_.path.clear();
+}
+
+TGAFile::Temporary::~Temporary() {
+    std::error_code ignored;
+    if (!path.empty()) fs::remove(path, ignored);
 }

@@ -5,6 +5,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 struct TGAColor {
@@ -27,9 +28,7 @@ public:
     // which is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map), and 64 KiB.
     static TGAImage read_tga_file(const std::filesystem::path& path);
 
-    // Writes the picture with the top row first and the 2.0 footer, run-length encoded or not. The bytes go to a temporary
-    // file beside PATH that is then renamed, so PATH is either the old picture or the new one, never half of one.
-    // Throws std::runtime_error "FILE: what", with the temporary file removed.
+    // Writes the picture to PATH: TGAFile(*this, path, rle).commit(), see below.
     void write_tga_file(const std::filesystem::path& path, bool rle = true) const;
 
     int width() const { return w_; }
@@ -62,4 +61,25 @@ private:
 
     int w_ = 0, h_ = 0, bpp_ = 0;
     std::vector<std::uint8_t> data_;  // rows from the bottom up
+};
+
+// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. All its bytes go to a
+// temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of one.
+// Without commit() the temporary file goes with the object. Of several pictures, commit the first when all of them are
+// constructed: where one does not fit on the disk, none is replaced.
+// Throws std::runtime_error "FILE: what", with the temporary file removed.
+class TGAFile {
+public:
+    TGAFile(const TGAImage& image, const std::filesystem::path& path, bool rle = true);
+    void commit();
+
+private:
+    struct Temporary {
+        std::filesystem::path path;  // empty: there is none
+        Temporary() = default;
+        Temporary(Temporary&& other) : path(std::exchange(other.path, {})) {}
+        ~Temporary();
+    };
+    std::filesystem::path path_;
+    Temporary temporary_;
 };

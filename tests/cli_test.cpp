@@ -97,12 +97,15 @@ TEST("a wrong command line ends with status 2 and one line") {
     check_error("--shadow soft", 2, "--shadow");
     check_error("--threads 0", 2, "--threads");
     check_error("-o", 2, "-o");
+    check_error("'--two\nlines'", 2, "--two?lines");
+    check_error("--size '5x5\n'", 2, "\"5x5?\"");
 }
 
 TEST("a file that is missing or no model ends with status 1 and one line that names it") {
     check_error("missing.obj", 1, "missing.obj");
     check_error(".", 1, ".");
     check_error("''", 1, "");
+    check_error("'no\nsuch.obj'", 1, "no?such.obj");
     const Folder f;
     f.write("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
     const Outcome o = run(f, "bad.obj");

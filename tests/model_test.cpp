@@ -379,6 +379,11 @@ TEST("a missing file, a folder and a binary file are errors") {
     CHECK_THROWS(Model(folder / "none.obj"), "none.obj: cannot be opened: ");
     fs::create_directory(folder / "folder.obj");
     CHECK_THROWS(Model(folder / "folder.obj"), "folder.obj: is a directory");
+    if (fs::is_other("/dev/null")) {  // a device or a pipe that a file names might never end
+        const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nmtllib /dev/null\nf 1 2 3\n";
+        write_bytes(folder / "device.obj", Bytes(text.begin(), text.end()));
+        CHECK_THROWS(Model(folder / "device.obj"), "/dev/null: is not a file");
+    }
     CHECK_THROWS(load(square + "f 1 2 3\n" + std::string(1, '\0')), "model.obj: is a binary file, not text");
     std::string utf16;
     for (const char c : square) utf16 += {c, '\0'};

@@ -229,7 +229,7 @@ TEST("cameras: tiny and huge up and light") {
         for (const char* length : {"1e-300", "4.9406564584124654e-324", "1e300", "1e307"})
             CHECK(good(f, scene + "--up 0," + length + ",0").frame == up.frame);
         const Outcome light = good(f, scene + "--light 1,1,0");
-        for (const char* c : {"1e-300", "4.9406564584124654e-324", "1e300", "1e307"}) {
+        for (const char* c : {"1e-300", "4.9406564584124654e-324", "1e300", "7e306"}) {
             const Outcome o = good(f, scene + "--light " + c + "," + c + ",0");
             CHECK(o.frame == light.frame && o.depth == light.depth);
         }
