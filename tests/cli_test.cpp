@@ -145,6 +145,20 @@ TEST("an output folder that cannot be written is one error line") {
     CHECK_EQ(f.files(), 1);
 }
 
+TEST("a standard output that takes nothing is one error line") {
+    if (!fs::is_character_file("/dev/full")) return;  // a device on which every write fails for want of space
+    const Folder f;
+    f.write("good.obj", triangle_obj);
+    const std::string inside = "cd \"" + f.path().string() + "\" && \"" UMBRA_BINARY "\" ";
+    for (const char* arguments : {"--size 40x40 --shadow-size 30 good.obj", "--quiet --report --size 40x40 --shadow-size 30 good.obj"}) {
+        const int raw = std::system((inside + arguments + " >/dev/full 2>stderr.txt").c_str());
+        CHECK_EQ(raw > 255 ? raw >> 8 : raw, 1);
+        CHECK_EQ(f.read("stderr.txt"), std::string("umbra: standard output: cannot write\n"));
+    }
+    CHECK(std::system((inside + "--help >/dev/full").c_str()) != 0);
+    CHECK(std::system((inside + "--version >/dev/full").c_str()) != 0);
+}
+
 TEST("one line says that a model was fitted, none with --no-fit") {
     const Folder f;
     f.write("big.obj", "v -10 -10 0\nv 10 -10 0\nv 0 10 0\nf 1 2 3\n");
