@@ -38,7 +38,7 @@ public:
 
     // Reads an .obj and the textures beside it. Throws std::runtime_error "FILE:LINE: what" (LINE counts from 1),
     // "FILE: what" for a file that cannot be read or has no face, and what TGAImage::read_tga_file throws.
-    // Memory is bounded by a constant times the size of the files, plus 1 GiB for copies of pictures that materials share
+    // Takes at most 256 times the size of the files and 384 KiB, plus 1 GiB for copies of pictures that materials share
     // (more is an error). Textures are not decoded for faces without texture coordinates.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
 

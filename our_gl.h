@@ -403,7 +403,7 @@ long draw_color(int begin, int end, const Shader& shader, const mat4& Viewport, 
 class LightGrid {
 public:
     LightGrid() = default;
-    // The light's screen is cells x cells large and shows all faces. Takes at most some 600 bytes a face.
+    // The light's screen is cells x cells large and shows all faces. Takes at most 720 bytes a face and 4 a cell.
     LightGrid(const std::vector<Model>& models, const Camera& light, int cells);
 
     // About one cell a face: measured, fewer make long lists and more take longer to fill than they save.
