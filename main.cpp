@@ -23,7 +23,7 @@ struct Options {  // the lesson's scene
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     vec3 light{1, 1, 0};  // towards the light
     enum class Shadow { map, exact, off } shadow = Shadow::map;
-    std::optional<double> bias;  // the lesson's constant, of screen_depth; else the bias is derived
+    std::optional<double> bias;  // the lesson's constant, a depth of screen_depth; without it the bias is derived
     bool fit = true, tangent = false, report = false, quiet = false;
     int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 };
@@ -75,7 +75,7 @@ struct NoShadow {  // --shadow off
 struct ConstantBias : Receiver {
     static constexpr double shift = .5;
     const DepthBuffer* shadowbuffer;
-    double bias;  // in units of screen_depth
+    double bias;  // a depth, as in the buffer: of screen_depth
 
     bool lit(const Fragment& f) const {
         const vec3 p = on_light_screen(f.bar);
@@ -93,13 +93,13 @@ struct ShadowMap : Receiver {
         const vec3 p = on_light_screen(f.bar);
         const auto depth = [&](int dx, int dy) { return static_cast<double>(shadowbuffer->at(p.x + dx, p.y + dy)); };
         // The receiver's own plane at the texel's centre: if nothing is above it there, the fragment is lit. So no face
-        // shadows itself, at any angle. Rounding: depths are floats, and coverage is snapped by up to 2^-16 texel.
+        // shadows itself, at any angle. Rounding: depths are floats, and coverage is snapped by half a sub-texel.
         const double stored = depth(0, 0);
         const vec2 g = slope(), to_centre{std::floor(p.x) + .5 - p.x, std::floor(p.y) + .5 - p.y};
-        const double rounding = depth_rounding + (std::fabs(g.x) + std::fabs(g.y)) / (1 << TriangleSetup::subpixel_bits);
+        const double rounding = depth_rounding + (std::fabs(g.x) + std::fabs(g.y)) / (2 << TriangleSetup::subpixel_bits);
         if (!(stored > p.z + dot(g, to_centre) + rounding)) return true;
-        // What is above it there may be as low here as the next texel. Of an axis' two neighbours the nearer in depth
-        // counts, since the other may be something else; between two lower ones, on a thin caster, it is half the way.
+        // Something is above it there; on its way here it may fall to the next texel's depth. Along each axis the neighbour
+        // nearer in depth tells by how much (the other may be another surface); if both are lower, half of that.
         const auto fall = [&](double a, double b) {
             return std::min(std::fabs(stored - a), std::fabs(stored - b)) / (a < stored && b < stored ? 2 : 1);
         };
@@ -115,16 +115,16 @@ struct ExactShadow : Receiver {
 
 enum class Normals { vertex, object, tangent };  // where the shading normal comes from: the vertices or a map
 
-// Phong's reflection model, shadowed. Everything is in eye coordinates. What the material has no map for is not computed.
+// Phong's reflection model, the lesson's weights, in eye coordinates. What the material has no map for is not computed.
 template <Normals normals, class Shadow>
 struct PhongShader final : IShader {
     const Model& model;
     const Material& material;
     Shadow shadow;
-    int first_number;           // of the model's faces
+    int first_number;            // of the model's faces
     mat4 uniform_M, uniform_PM;  // object to eye, object to clip
-    mat4 uniform_MIT;           // carries normals where uniform_M carries points
-    vec3 uniform_l;             // towards the light, unit
+    mat4 uniform_MIT;            // carries normals where uniform_M carries points
+    vec3 uniform_l;              // towards the light, unit
 
     vec2 varying_uv[3];
     vec3 varying_nrm[3];  // the vertices' normals
@@ -169,7 +169,7 @@ struct PhongShader final : IShader {
         if (n_l > 0) {  // else it has no light to lose, and no shadow is looked up
             light = 1.2 * n_l;
             if (!material.specular.empty()) {
-                const vec3 r = n * (2 * n_l) - l;  // the light's mirror image; the viewer is at +z
+                const vec3 r = n * (2 * n_l) - l;  // the light's mirror image; the viewer is far off at +z
                 if (r.z > 0) light += .6 * power(r.z, *sample2D(material.specular, uv));
             }
             if (!shadow.lit(f)) light *= .3;
@@ -282,13 +282,13 @@ Several models share one scene. Without a model: the idol.
   --center X,Y,Z     what the viewer looks at (0,0,0)
   --up X,Y,Z         what appears upwards (0,1,0)
   --light X,Y,Z      direction towards the light (1,1,0)
-  --shadow HOW       map: a shadow buffer; exact: the faces themselves; off (map)
-  --bias N           the lesson's shadow buffer: its camera, a constant bias of N of 2000 (43.34)
+  --shadow HOW       map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)
+  --bias N           with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)
   --tangent          prefer a tangent-space normal map to an object-space one
-  --no-fit           keep a model's own coordinates (default: fit what exceeds [-1,1]^3)
+  --no-fit           keep a model's own coordinates (default: fit what is beyond [-1,1]^3 or too small to see)
   --threads N        (all processors)
   --report           print how far the shadows and the picture are from the truth
-  --quiet            print nothing but errors
+  --quiet            print errors only, and a report that is asked for
   --help, --version
 )";
 

@@ -412,7 +412,6 @@ public:
     // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
     bool shadows(const vec3& on_screen, int number) const;
 
-    std::size_t entries() const { return entries_.size(); }
     std::size_t bytes() const;
 
 private:

@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
     for (const char* n_l : {".1", ".01", ".001", ".0001"})
         for (const char* method : {"map", "exact"})
             hold(std::string("plane at n.l = ") + n_l + ", " + method,
-                 report(folder, std::string("--light 1,") + n_l + ",.3 --shadow " + method + " \"" + (folder / "plane.obj").string() + "\""),
+                 report(folder, std::string("--light .8,") + n_l + ",.6 --shadow " + method + " \"" + (folder / "plane.obj").string() + "\""),
                  "falsely_dark", 0);
 
     std::puts(open ? "the gate is open" : "the gate is shut");

@@ -326,7 +326,10 @@ TEST("a temporary file on a full device is one error line") {
     const Stage stage(60, 50);
     const Pair pair(stage);
     for (const char* file : {"depth.tga", "framebuffer.tga"}) {
-        if (!fs::is_character_file("/dev/full")) continue;
+        if (!fs::is_character_file("/dev/full")) {
+            std::cout << "skipped: " << file << " on a full device: there is no /dev/full\n";
+            continue;
+        }
         stage.put(pair.before);
         fs::create_symlink("/dev/full", stage.out / (std::string(file) + ".part"));
         CHECK(Child(stage.path(), stage.arguments(new_light), as_it_is)

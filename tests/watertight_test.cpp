@@ -38,7 +38,7 @@ Hits tessellated(const mat4& M, const mat4& Viewport, int cells, Random& r) {
 }
 
 // Where the pixel centre lies in the square, from the inverse transform: 1 inside, 0 outside, -1 within 1/4096 pixel of
-// its outline (snapping moves an outline by up to 1/65536 pixel and a half).
+// its outline: snapping moves a corner by up to 2^-17 pixel, and clipping by the near plane by 2^-13 (w_near in our_gl.cpp).
 int expected(const mat4& M, const mat4& Viewport, int cells, int x, int y) {
     const mat4 s = Viewport * M;
     const mat3 h{{{s[0].x, s[0].y, s[0].w}, {s[1].x, s[1].y, s[1].w}, {s[3].x, s[3].y, s[3].w}}};
