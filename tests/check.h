@@ -16,6 +16,15 @@
 #include <string>
 #include <vector>
 
+// Where the address sanitizer watches, some cases would need more time or memory than they are worth.
+#if defined(__SANITIZE_ADDRESS__)
+#define UMBRA_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define UMBRA_SANITIZED 1
+#endif
+#endif
+
 struct Test {
     const char* name;
     std::function<void()> body;

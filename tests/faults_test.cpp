@@ -21,14 +21,6 @@
 #include <sys/mount.h>
 #endif
 
-#if defined(__SANITIZE_ADDRESS__)
-#define UMBRA_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define UMBRA_SANITIZED 1
-#endif
-#endif
-
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 

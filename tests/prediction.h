@@ -4,21 +4,14 @@
 //
 // A buffer judges a point by a sample beside it. Where the boundary of the shadow passes between the two, the verdict
 // is wrong. So the error is the probability that a needle from a point to its sample crosses the boundary; the needle
-// is uniform over the texel, and by Crofton's formula its crossings measure the boundary's length L. With A the lit and
-// shadowed area, both as the light sees them, and m the needle's mean length,
+// is uniform over the texel, and by Crofton's formula its crossings measure the boundary's length L. With A the area
+// that faces the light, both as the light sees them, and m the needle's mean length,
 //     share of wrong pixels = floor + 2/pi * m * L/A,
-// where 2/pi is the mean of |cos| between needle and boundary. A square texel of side h read at its centre has
-// 2/pi * m = .2436 h; read at a corner, twice that. The floor is what a bias makes wrong at any resolution.
+// where 2/pi is the mean of |cos| between needle and boundary, and the floor is what a bias makes wrong by itself.
 #pragma once
 #include "truth.h"
 
-// What a shadow buffer with square texels of side h, read at the nearest texel, adds to the errors of its bias:
-//     share of wrong pixels = nearest_texel_error * h * L/A,
-// L the length of the shadow's boundary and A the area that faces the light, both as the light sees them.
-// A point is judged by its texel's centre, wrongly where the boundary passes between the two. Shift a straight boundary
-// with unit normal n through all positions: the wrong area for each h of length is then h^2 times the integral of
-// |x . n| over the unit square around 0. The mean of |x . n| over all n is 2/pi |x|, and the mean of |x| over the
-// square is (sqrt(2) + ln(1 + sqrt(2)))/6.
+// 2/pi * m for square texels of side 1 that are read at their centres; read at a corner, it is twice that.
 inline constexpr double nearest_texel_error = 0.2435693614160477;  // (sqrt(2) + ln(1 + sqrt(2))) / (3 pi)
 
 // A texel of the light's picture, as the light sees it, in the scene's unit; x and y are those of lookat().

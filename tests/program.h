@@ -1,4 +1,4 @@
-// program.h: runs the program that the report judges, and reads the values that it prints.
+// program.h: runs the program that a report or a gate judges, and reads the values that it prints.
 #pragma once
 #include "files.h"
 
@@ -22,7 +22,7 @@ inline std::string quoted(const std::string& argument) {  // for a POSIX shell
 
 class Program {
 public:
-    explicit Program(std::string binary) : binary_(std::move(binary)), folder_("report") {}
+    explicit Program(std::string binary) : binary_(std::move(binary)), folder_("program") {}
 
     // Its pictures and whatever else a run needs.
     const TemporaryFolder& folder() const { return folder_; }

@@ -4,6 +4,7 @@
 #include "files.h"
 #include "our_gl.h"
 #include "random.h"
+#include "scenes.h"
 #include "tgaimage.h"
 
 #include <algorithm>
@@ -13,14 +14,6 @@
 #include <string>
 
 namespace fs = std::filesystem;
-
-#if defined(__SANITIZE_ADDRESS__)
-#define UMBRA_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define UMBRA_SANITIZED 1
-#endif
-#endif
 
 namespace {
 
@@ -95,56 +88,7 @@ void check_no_acne(const Folder& f, const std::string& arguments) {
     if (!CHECK_EQ(figures.count("self") ? figures.at("self") : -1, 0.)) std::cerr << "    umbra " << arguments << '\n';
 }
 
-std::string number(double x) {
-    std::ostringstream out;
-    out.precision(17);
-    out << x;
-    return out.str();
-}
-std::string triple(const vec3& v) { return number(v.x) + "," + number(v.y) + "," + number(v.z); }
-
 // ---- scenes ----
-
-class Obj {
-public:
-    int vertex(const vec3& v) {
-        text_ << "v " << number(v.x) << ' ' << number(v.y) << ' ' << number(v.z) << '\n';
-        return ++n_;
-    }
-    void polygon(const std::vector<vec3>& corners) {
-        std::string line = "f";
-        for (const vec3& v : corners) line += ' ' + std::to_string(vertex(v));
-        text_ << line << '\n';
-    }
-    std::string text() const { return text_.str(); }
-
-private:
-    std::ostringstream text_;
-    int n_ = 0;
-};
-
-// A floor, a wall and a floating block. All coordinates are multiples of 1/8, so that moving them by a whole number or
-// multiplying them by a power of two is exact.
-std::string yard(const vec3& scale = {1, 1, 1}, const vec3& by = {}) {
-    Obj obj;
-    const auto box = [&](const vec3& a, const vec3& b) {
-        const auto at = [&](int x, int y, int z) {
-            const vec3 v{x ? b.x : a.x, y ? b.y : a.y, z ? b.z : a.z};
-            return vec3{v.x * scale.x, v.y * scale.y, v.z * scale.z} + by;
-        };
-        obj.polygon({at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)});
-        obj.polygon({at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)});
-        obj.polygon({at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)});
-        obj.polygon({at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0)});
-        obj.polygon({at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0)});
-        obj.polygon({at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)});
-    };
-    box({-1, -.625, -1}, {1, -.5, 1});
-    box({-.5, -.5, -.5}, {-.25, .5, .5});
-    box({.125, 0, 0}, {.5, .25, .5});
-    return obj.text();
-}
-std::string yard(double scale) { return yard(vec3{scale, scale, scale}); }
 
 // [-1,1]^2 at the height z.
 std::string square(double side = 1, double z = 0) {

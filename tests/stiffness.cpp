@@ -6,81 +6,37 @@
 #include <iostream>
 
 #include "our_gl.h"
+#include "scenes.h"
 
 namespace {
 
-std::string number(double x) {
-    std::ostringstream out;
-    out.precision(17);
-    out << x;
-    return out.str();
+std::string file(const Program& umbra, const std::string& text) {
+    const std::filesystem::path path = umbra.folder() / "scene.obj";
+    write_bytes(path, Bytes(text.begin(), text.end()));
+    return path.string();
 }
-std::string triple(const vec3& v) { return number(v.x) + "," + number(v.y) + "," + number(v.z); }
-
-// ---- scenes ----
-
-class Scene {
-public:
-    void polygon(const std::vector<vec3>& corners) {
-        std::string face = "f";
-        for (const vec3& v : corners) {
-            text_ += "v " + number(v.x) + ' ' + number(v.y) + ' ' + number(v.z) + '\n';
-            face += ' ' + std::to_string(++n_);
-        }
-        text_ += face + '\n';
-    }
-    void box(const vec3& a, const vec3& b) {
-        const auto at = [&](int x, int y, int z) { return vec3{x ? b.x : a.x, y ? b.y : a.y, z ? b.z : a.z}; };
-        polygon({at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)});
-        polygon({at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)});
-        polygon({at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)});
-        polygon({at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0)});
-        polygon({at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0)});
-        polygon({at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)});
-    }
-    std::string file(const Program& umbra) const {
-        const std::filesystem::path path = umbra.folder() / "scene.obj";
-        write_bytes(path, Bytes(text_.begin(), text_.end()));
-        return path.string();
-    }
-
-private:
-    std::string text_;
-    int n_ = 0;
-};
-
-// A floor, a wall and a floating block, their corners at multiples of 1/8.
-Scene yard(const vec3& scale) {
-    Scene scene;
-    const auto s = [&](double x, double y, double z) { return vec3{x * scale.x, y * scale.y, z * scale.z}; };
-    scene.box(s(-1, -.625, -1), s(1, -.5, 1));
-    scene.box(s(-.5, -.5, -.5), s(-.25, .5, .5));
-    scene.box(s(.125, 0, 0), s(.5, .25, .5));
-    return scene;
-}
-Scene yard(double scale) { return yard(vec3{scale, scale, scale}); }
 
 // [-1,1]^2 at y = 0, seen from above, in n x n squares.
-Scene floor_of(int n) {
-    Scene scene;
+std::string floor_of(int n) {
+    Obj scene;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
             const auto at = [&](int a, int b) { return vec3{2. * a / n - 1, 0, 1 - 2. * b / n}; };
             scene.polygon({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
         }
-    return scene;
+    return scene.text();
 }
 
 // 60 needles around the middle, of a length of 1.6.
-Scene needles(double length_to_width) {
-    Scene scene;
+std::string needles(double length_to_width) {
+    Obj scene;
     for (int i = 0; i < 60; i++) {
         const double angle = .1 + .05 * i, z = .01 * i;
         const vec3 along{.8 * std::cos(angle), .8 * std::sin(angle), 0}, across{-along.y, along.x, 0};
         const vec3 at{0, 0, z};
         scene.polygon({at - along, at + along - across / length_to_width, at + along + across / length_to_width});
     }
-    return scene;
+    return scene.text();
 }
 
 constexpr const char* picture = "--report --size 400x400 ";
@@ -158,9 +114,9 @@ struct Corners {
     }
     // The program's way: the model moved, the light's camera fitted to it.
     double here(const Program& umbra) const {
-        Scene scene;
+        Obj scene;
         for (std::size_t i = 0; i < at.size(); i++) scene.polygon({at[i], at[(i + 1) % at.size()], at[(i + 57) % at.size()]});
-        std::vector<Model> models(1, Model(scene.file(umbra)));
+        std::vector<Model> models(1, Model(file(umbra, scene.text())));
         models[0].move(-center);
         const mat4 uniform_Mshadow = fitted_camera(models, to_light, {0, 1, 0}, size).object_to_screen();
         const auto exact = seen_by_light();
@@ -206,7 +162,7 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     family("eye's distance (1/c)", "classic Mshadow in float, pixels", sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
 
     const std::vector<double> grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
-    const std::string plane = floor_of(1).file(umbra);
+    const std::string plane = file(umbra, floor_of(1));
     for (const auto& [method, arguments] : {std::pair("--bias 43.34, falsely dark %", "--bias 43.34"), std::pair("map, falsely dark %", "--shadow map"),
                                             std::pair("exact, falsely dark %", "--shadow exact")})
         family("light over a plane at n.l", method, 0, grazing, [&](double n_l) {
@@ -232,23 +188,23 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     });
 
     family("model scaled by", "exact, wrong pixels", 0, {1e-300, 1e-30, 1e-6, 1, 1e6, 1e30, 1e300}, [&](double s) {
-        return wrong_pixels(umbra, quoted(yard(s).file(umbra)));
+        return wrong_pixels(umbra, quoted(file(umbra, yard(s))));
     });
     family("one axis scaled by", "exact, wrong pixels", 0, {1e-9, 1e-6, 1e-3, 1, 1e3, 1e6, 1e9}, [&](double s) {
-        return wrong_pixels(umbra, quoted(yard(vec3{1, 1, s}).file(umbra)));
+        return wrong_pixels(umbra, quoted(file(umbra, yard(vec3{1, 1, s}))));
     });
     family("eye this near to center", "exact, wrong pixels", 0, {1e-1, 1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}, [&](double d) {
         const vec3 center{0, -.25, 0};
-        return wrong_pixels(umbra, "--center " + triple(center) + " --eye " + triple(center + vec3{.25, .125, 1} * d) + " " + quoted(yard(1).file(umbra)));
+        return wrong_pixels(umbra, "--center " + triple(center) + " --eye " + triple(center + vec3{.25, .125, 1} * d) + " " + quoted(file(umbra, yard(1))));
     });
     // Coverage is snapped by up to 2^-17 pixel: 120 long edges of 240 pixels sweep over 120 * 240 * 2^-17 = .22 pixels'
     // centres. More than 3 would be a fault (Poisson: one time in 10 000).
     family("needles, length to width", "exact, wrong pixels", 3, {1e1, 1e3, 1e5, 1e7, 1e9}, [&](double ratio) {
-        return wrong_pixels(umbra, "--light .3,.2,1 " + quoted(needles(ratio).file(umbra)));
+        return wrong_pixels(umbra, "--light .3,.2,1 " + quoted(file(umbra, needles(ratio))));
     });
     family("faces a pixel", "exact, wrong pixels", 0, {.02, 2, 10, 50}, [&](double faces) {  // the floor is 300 x 300 pixels
         const int n = static_cast<int>(std::lround(std::sqrt(faces * 90000 / 2)));
-        return wrong_pixels(umbra, "--eye 0,4,.001 --light .3,1,.2 " + quoted(floor_of(n).file(umbra)));
+        return wrong_pixels(umbra, "--eye 0,4,.001 --light .3,1,.2 " + quoted(file(umbra, floor_of(n))));
     });
     return rows;
 }
