@@ -54,7 +54,7 @@ public:
 
     void assign(const std::uint8_t* data, std::size_t size) {
         std::rewind(file_);
-        if (std::fwrite(data, 1, size, file_) != size) refuse(path_.string() + ": cannot be written");
+        if (size > 0 && std::fwrite(data, 1, size, file_) != size) refuse(path_.string() + ": cannot be written");
         if (size < size_) std::filesystem::resize_file(path_, size);
         size_ = size;
     }
