@@ -163,11 +163,14 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
 
     const std::vector<double> grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
     const std::string plane = file(umbra, floor_of(1));
-    for (const auto& [method, arguments] : {std::pair("--bias 43.34, falsely dark %", "--bias 43.34"), std::pair("map, falsely dark %", "--shadow map"),
-                                            std::pair("exact, falsely dark %", "--shadow exact")})
-        family("light over a plane at n.l", method, 0, grazing, [&](double n_l) {
-            return value_of(umbra.run(picture + (arguments + (" --light .8," + number(n_l) + ",.6 ") + quoted(plane))), "falsely_dark_percent");
+    const auto on_plane = [&](const std::string& method, const std::string& arguments) {
+        family("light over a plane at n.l", method + ", falsely dark %", 0, grazing, [&](double n_l) {
+            return value_of(umbra.run(picture + arguments + " --light .8," + number(n_l) + ",.6 " + quoted(plane)), "falsely_dark_percent");
         });
+    };
+    on_plane("--bias 43.34", "--bias 43.34");
+    on_plane("map", "--shadow map");
+    on_plane("exact", "--shadow exact");
 
     family("two layers apart by", "the rear one seen, %", 0, {1e-2, 1e-4, 1e-6, 1.3e-7, 1e-8, 1e-9}, [&](double gap) {
         struct Layers final : IShader {
