@@ -23,6 +23,7 @@ struct Options {  // the lesson's scene
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     vec3 light{1, 1, 0};  // towards the light
     enum class Shadow { map, exact, off } shadow = Shadow::map;
+    enum class Draw { color, shadow, normal } draw = Draw::color;
     std::optional<double> bias;  // the lesson's constant, a depth of screen_depth; without it the bias is derived
     bool fit = true, tangent = false, report = false, quiet = false;
     int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -125,6 +126,7 @@ struct PhongShader final : IShader {
     mat4 uniform_M, uniform_PM;  // object to eye, object to clip
     mat4 uniform_MIT;            // carries normals where uniform_M carries points
     vec3 uniform_l;              // towards the light, unit
+    Options::Draw draw;
 
     vec2 varying_uv[3];
     vec3 varying_nrm[3];  // the vertices' normals
@@ -133,7 +135,7 @@ struct PhongShader final : IShader {
     PhongShader(const Scene& scene, const Model& m, const Material& mat, const Shadow& s, int first)
         : model(m), material(mat), shadow(s), first_number(first), uniform_M(scene.viewer.ModelView),
           uniform_PM(scene.viewer.object_to_clip()), uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
-          uniform_l(normalized((uniform_M * direction(normalized(scene.opt.light))).xyz())) {}
+          uniform_l(normalized((uniform_M * direction(normalized(scene.opt.light))).xyz())), draw(scene.opt.draw) {}
 
     vec4 vertex(int face, int corner) override {
         const vec3& v = model.vert(face, corner);
@@ -165,6 +167,15 @@ struct PhongShader final : IShader {
         const vec2 uv = interpolated(varying_uv, f.bar);
         const vec3 n = normal(f.bar, uv), l = uniform_l;
         const double n_l = dot(n, l);
+        if (draw == Options::Draw::shadow) {  // grey: turned away from the light
+            const std::uint8_t v = n_l > 0 ? shadow.lit(f) ? 255 : 0 : 128;
+            return {{v, v, v, 255}};
+        }
+        if (draw == Options::Draw::normal) {  // [-1,1] to [0,255]; red is to the right, green up, blue towards the viewer
+            TGAColor color{{0, 0, 0, 255}};
+            for (int c = 0; c < 3; c++) color[2 - c] = static_cast<std::uint8_t>((n[c] * .5 + .5) * 255 + .5);
+            return color;
+        }
         double light = 0;
         if (n_l > 0) {  // else it has no light to lose, and no shadow is looked up
             light = 1.2 * n_l;
@@ -284,6 +295,7 @@ Several models share one scene. Without a model: the idol.
   --light X,Y,Z      direction towards the light (1,1,0)
   --shadow HOW       map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)
   --bias N           with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)
+  --draw WHAT        color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)
   --tangent          prefer a tangent-space normal map to an object-space one
   --no-fit           keep a model's own coordinates (default: fit what is beyond [-1,1]^3 or too small to see)
   --threads N        (all processors)
@@ -329,6 +341,12 @@ static Options parse(int argc, char** argv) {
             else if (how == "exact") opt.shadow = Options::Shadow::exact;
             else if (how == "off") opt.shadow = Options::Shadow::off;
             else fail("map, exact or off");
+        } else if (arg == "--draw") {
+            const std::string what = value();
+            if (what == "color") opt.draw = Options::Draw::color;
+            else if (what == "shadow") opt.draw = Options::Draw::shadow;
+            else if (what == "normal") opt.draw = Options::Draw::normal;
+            else fail("color, shadow or normal");
         } else if (arg == "--no-fit") opt.fit = false;
         else if (arg == "--tangent") opt.tangent = true;
         else if (arg == "--threads") integer(opt.threads, 256);

@@ -2,7 +2,7 @@
 // A fuzzer is one function, LLVMFuzzerTestOneInput; libFuzzer or standalone.cpp calls it with one input after the
 // other.
 #pragma once
-#include "../files.h"
+#include "files.h"
 #include "peak.h"
 
 #include <algorithm>
