@@ -1,4 +1,4 @@
-// geometry.h: small vectors and matrices of fixed size, written the way the mathematics is.
+// geometry.h: small vectors and matrices of fixed size, written the way the mathematics is, and numbers in lanes.
 // It knows nothing of pictures, models or cameras. Lesson paragraph: "a bit of linear algebra".
 //
 // Conventions: vectors are columns, matrices are rows of numbers, M*v transforms v. Every operation is plain IEEE
@@ -6,10 +6,119 @@
 #pragma once
 #include <cassert>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <type_traits>
 #include <utility>
+
+// For the small functions that a shader is made of: a call would cost more than what they do.
+#define INLINED [[gnu::always_inline]] inline
+
+// ---- lanes: several numbers side by side, as a GPU has them ----
+//
+// A real is one number for each of a few pixels, a mask one truth value for each. What is written once is done for all of
+// them, in the processor's vector registers; each lane holds what the number alone would be, bit for bit, so the number
+// of lanes shows in no picture. A real is made of parts as large as a register.
+
+#if defined(__AVX__)
+constexpr int lanes = 8, register_bytes = 32;
+#else
+constexpr int lanes = 4, register_bytes = 16;
+#endif
+
+#if defined(__GNUC__)  // gcc and clang know operators of whole registers
+template <class T>
+struct part_of {
+    typedef T type __attribute__((vector_size(register_bytes)));
+};
+#else
+template <class T>
+struct part_of {
+    typedef T type;
+};
+#endif
+
+template <class T>
+struct pack {
+    using part = typename part_of<T>::type;
+    static constexpr int parts = lanes * static_cast<int>(sizeof(T)) / static_cast<int>(sizeof(part));
+    part p[parts];
+
+    pack() = default;
+    INLINED pack(T s) { for (part& each : p) each = s - part{}; }
+    INLINED explicit pack(const T (&values)[lanes]) { std::memcpy(p, values, sizeof p); }
+    INLINED void store(T (&values)[lanes]) const { std::memcpy(values, p, sizeof p); }
+    INLINED T operator[](int i) const {
+        T values[lanes];
+        store(values);
+        return values[i];
+    }
+};
+
+using real = pack<double>;
+
+struct mask {
+    pack<std::int64_t> m;  // 0 is false
+    mask() = default;
+    INLINED mask(bool b) : m(b ? -1 : 0) {}
+    INLINED bool operator[](int i) const { return m[i] != 0; }
+};
+
+#define UMBRA_LANEWISE(result, op, type, a, b)                                     \
+    INLINED result operator op(const type& a_, const type& b_) {                   \
+        result out;                                                                \
+        for (int i = 0; i < real::parts; i++) out.a[i] = a_.b[i] op b_.b[i];       \
+        return out;                                                                \
+    }
+UMBRA_LANEWISE(real, +, real, p, p)
+UMBRA_LANEWISE(real, -, real, p, p)
+UMBRA_LANEWISE(real, *, real, p, p)
+UMBRA_LANEWISE(real, /, real, p, p)
+UMBRA_LANEWISE(mask, <, real, m.p, p)
+UMBRA_LANEWISE(mask, >, real, m.p, p)
+UMBRA_LANEWISE(mask, ==, real, m.p, p)
+UMBRA_LANEWISE(mask, &, mask, m.p, m.p)
+UMBRA_LANEWISE(mask, |, mask, m.p, m.p)
+#undef UMBRA_LANEWISE
+INLINED real operator-(const real& a) { return real(-0.) - a; }
+INLINED mask operator!(const mask& a) {
+    mask out;
+    for (int i = 0; i < real::parts; i++) out.m.p[i] = a.m.p[i] == 0;
+    return out;
+}
+INLINED real& operator+=(real& a, const real& b) { return a = a + b; }
+INLINED real& operator*=(real& a, const real& b) { return a = a * b; }
+
+// a where the mask is true, b elsewhere.
+INLINED real select(const mask& m, const real& a, const real& b) {
+    real out;
+    for (int i = 0; i < real::parts; i++) out.p[i] = m.m.p[i] ? a.p[i] : b.p[i];
+    return out;
+}
+INLINED bool any(const mask& m) {
+    pack<std::int64_t>::part sum = m.m.p[0];
+    for (int i = 1; i < real::parts; i++) sum |= m.m.p[i];
+    std::int64_t lane[sizeof sum / 8], all = 0;
+    std::memcpy(lane, &sum, sizeof sum);
+    for (const std::int64_t each : lane) all |= each;
+    return all != 0;
+}
+INLINED real min(const real& a, const real& b) { return select(b < a, b, a); }  // as std::min, also of a NaN
+INLINED real max(const real& a, const real& b) { return select(a < b, b, a); }
+
+// f(number) in each lane.
+template <class F>
+INLINED real each(const real& a, F&& f) {
+    double values[lanes];
+    a.store(values);
+    for (double& v : values) v = f(v);
+    return real(values);
+}
+INLINED real sqrt(const real& a) { return each(a, [](double v) { return std::sqrt(v); }); }
+INLINED real floor(const real& a) { return each(a, [](double v) { return std::floor(v); }); }
+INLINED real abs(const real& a) { return each(a, [](double v) { return std::fabs(v); }); }
 
 // ---- vectors: any size and scalar; two, three and four components also have names ----
 
@@ -46,39 +155,36 @@ using vec2 = vec<2>;
 using vec3 = vec<3>;
 using vec4 = vec<4>;
 
-template <int n, typename T>
-constexpr vec<n, T> operator+(vec<n, T> a, const vec<n, T>& b) {
-    for (int i = 0; i < n; i++) a[i] += b[i];
-    return a;
+// Component by component. A vector of lanes times a plain one gives lanes.
+template <int n, typename T, typename F>
+INLINED constexpr auto componentwise(F&& f) {
+    vec<n, T> out;
+    for (int i = 0; i < n; i++) out[i] = f(i);
+    return out;
 }
-
-template <int n, typename T>
-constexpr vec<n, T> operator-(vec<n, T> a, const vec<n, T>& b) {
-    for (int i = 0; i < n; i++) a[i] -= b[i];
-    return a;
+template <int n, typename T, typename S>
+INLINED constexpr auto operator+(const vec<n, T>& a, const vec<n, S>& b) {
+    return componentwise<n, decltype(a[0] + b[0])>([&](int i) { return a[i] + b[i]; });
 }
-
-template <int n, typename T>
-constexpr vec<n, T> operator-(vec<n, T> a) {
-    for (int i = 0; i < n; i++) a[i] = -a[i];
-    return a;
+template <int n, typename T, typename S>
+INLINED constexpr auto operator-(const vec<n, T>& a, const vec<n, S>& b) {
+    return componentwise<n, decltype(a[0] - b[0])>([&](int i) { return a[i] - b[i]; });
 }
-
 template <int n, typename T>
-constexpr vec<n, T> operator*(vec<n, T> a, std::type_identity_t<T> s) {
-    for (int i = 0; i < n; i++) a[i] *= s;
-    return a;
+INLINED constexpr vec<n, T> operator-(const vec<n, T>& a) {
+    return componentwise<n, T>([&](int i) { return -a[i]; });
 }
-
 template <int n, typename T>
-constexpr vec<n, T> operator*(std::type_identity_t<T> s, const vec<n, T>& a) {
+INLINED constexpr vec<n, T> operator*(const vec<n, T>& a, const std::type_identity_t<T>& s) {
+    return componentwise<n, T>([&](int i) { return a[i] * s; });
+}
+template <int n, typename T>
+INLINED constexpr vec<n, T> operator*(const std::type_identity_t<T>& s, const vec<n, T>& a) {
     return a * s;
 }
-
 template <int n, typename T>
-constexpr vec<n, T> operator/(vec<n, T> a, std::type_identity_t<T> s) {
-    for (int i = 0; i < n; i++) a[i] /= s;
-    return a;
+INLINED constexpr vec<n, T> operator/(const vec<n, T>& a, const std::type_identity_t<T>& s) {
+    return componentwise<n, T>([&](int i) { return a[i] / s; });
 }
 
 template <int n, typename T>
@@ -88,17 +194,17 @@ constexpr bool operator==(const vec<n, T>& a, const vec<n, T>& b) {
     return true;
 }
 
-template <int n, typename T>
-constexpr T dot(const vec<n, T>& a, const vec<n, T>& b) {
-    T sum = a[0] * b[0];
-    for (int i = 1; i < n; i++) sum += a[i] * b[i];
+template <int n, typename T, typename S>
+INLINED constexpr auto dot(const vec<n, T>& a, const vec<n, S>& b) {
+    auto sum = a[0] * b[0];
+    for (int i = 1; i < n; i++) sum = sum + a[i] * b[i];
     return sum;
 }
 
 // Right-handed: x cross y = z.
-template <typename T>
-constexpr vec<3, T> cross(const vec<3, T>& a, const vec<3, T>& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+template <typename T, typename S>
+INLINED constexpr auto cross(const vec<3, T>& a, const vec<3, S>& b) {
+    return vec<3, decltype(a.x * b.y)>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 // Euclidean length. The vector is first scaled by a power of two (exactly), so neither 1e-200 nor 1e200 is lost.
@@ -127,11 +233,27 @@ vec<n, T> normalized(const vec<n, T>& v) {
     for (int i = 0; i < n; i++) scaled[i] = std::scalbn(v[i], -std::ilogb(largest));
     return scaled / std::sqrt(dot(scaled, scaled));
 }
+template <int n>
+INLINED vec<n, real> normalized(const vec<n, real>& v) {
+    const real squared = dot(v, v);
+    vec<n, real> unit = v / sqrt(squared);
+    if (any(!(squared > 1e-30) | !(squared < 1e30))) {
+        double lane[n][lanes];
+        for (int l = 0; l < lanes; l++) {
+            vec<n> one;
+            for (int i = 0; i < n; i++) one[i] = v[i][l];
+            one = normalized(one);
+            for (int i = 0; i < n; i++) lane[i][l] = one[i];
+        }
+        for (int i = 0; i < n; i++) unit[i] = real(lane[i]);
+    }
+    return unit;
+}
 
 // Homogeneous coordinates. A point moves with a translation, a direction does not: they are embedded by two different
 // functions, because the wrong one compiles just as well and leaks the projection into every normal.
 template <int n, typename T>
-constexpr vec<n + 1, T> point(const vec<n, T>& v) {
+INLINED constexpr vec<n + 1, T> point(const vec<n, T>& v) {
     vec<n + 1, T> h;
     for (int i = 0; i < n; i++) h[i] = v[i];
     h[n] = 1;
@@ -139,7 +261,7 @@ constexpr vec<n + 1, T> point(const vec<n, T>& v) {
 }
 
 template <int n, typename T>
-constexpr vec<n + 1, T> direction(const vec<n, T>& v) {
+INLINED constexpr vec<n + 1, T> direction(const vec<n, T>& v) {
     vec<n + 1, T> h;
     for (int i = 0; i < n; i++) h[i] = v[i];
     h[n] = 0;
@@ -148,7 +270,7 @@ constexpr vec<n + 1, T> direction(const vec<n, T>& v) {
 
 // From homogeneous back to Cartesian coordinates: the perspective division. The caller sees to it that w is not zero.
 template <typename T>
-constexpr vec<3, T> project(const vec<4, T>& h) {
+INLINED constexpr vec<3, T> project(const vec<4, T>& h) {
     return {h.x / h.w, h.y / h.w, h.z / h.w};
 }
 
@@ -176,11 +298,9 @@ struct mat {
 using mat3 = mat<3, 3>;
 using mat4 = mat<4, 4>;
 
-template <int r, int c, typename T>
-constexpr vec<r, T> operator*(const mat<r, c, T>& m, const vec<c, T>& v) {
-    vec<r, T> out;
-    for (int i = 0; i < r; i++) out[i] = dot(m[i], v);
-    return out;
+template <int r, int c, typename T, typename S>
+INLINED constexpr vec<r, S> operator*(const mat<r, c, T>& m, const vec<c, S>& v) {
+    return componentwise<r, S>([&](int i) { return dot(m[i], v); });
 }
 
 template <int r, int k, int c, typename T>
@@ -204,24 +324,6 @@ constexpr mat<c, r, T> transpose(const mat<r, c, T>& m) {
     for (int i = 0; i < r; i++)
         for (int j = 0; j < c; j++) out[j][i] = m[i][j];
     return out;
-}
-
-// Laplace expansion along the first row: exact enough and short for the sizes that a renderer uses.
-template <int n, typename T>
-constexpr T determinant(const mat<n, n, T>& m) {
-    if constexpr (n == 1) {
-        return m[0][0];
-    } else {
-        T sum = 0;
-        for (int j = 0; j < n; j++) {
-            mat<n - 1, n - 1, T> minor;
-            for (int r = 1; r < n; r++)
-                for (int c = 0, k = 0; c < n; c++)
-                    if (c != j) minor[r - 1][k++] = m[r][c];
-            sum += (j % 2 ? -m[0][j] : m[0][j]) * determinant(minor);
-        }
-        return sum;
-    }
 }
 
 // The inverse, or nothing where the matrix is singular to working precision (or holds a NaN or an infinity).
