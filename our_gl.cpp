@@ -1,7 +1,17 @@
-// our_gl.cpp: the cameras' matrices, and the way of a face from clip space to integer coverage.
+// our_gl.cpp: the cameras' matrices; the way of a face from clip space to the pixels that it covers, and of these to
+// their colours; the threads; the bias and the grid of the shadows.
 #include "our_gl.h"
 
-#include <cmath>
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <stdexcept>
+#include <system_error>
+#include <thread>
+
+// ---- cameras ----
 
 mat4 lookat(const vec3& eye, const vec3& center, const vec3& up) {
     vec3 z = normalized(eye - center);
@@ -31,15 +41,9 @@ mat4 middle_viewport(int width, int height) {
     return viewport((width - side) / 2, (height - side) / 2, side, side);
 }
 
-int face_count(const std::vector<Model>& models) {
-    int n = 0;
-    for (const Model& model : models) n += model.nfaces();
-    return n;
-}
-
-Camera fitted_camera(const std::vector<Model>& models, const vec3& direction, const vec3& up, int size) {
+Camera fitted(const Camera& camera, const std::vector<Model>& models, int size) {
     constexpr double inf = std::numeric_limits<double>::infinity();
-    Camera camera{lookat(direction, {}, up), mat4::identity(), viewport(0, 0, size, size)};
+    Camera result{camera.ModelView, mat4::identity(), viewport(0, 0, size, size)};
     vec3 low{inf, inf, inf}, high{-inf, -inf, -inf};
     for (const Model& model : models) {
         for (int corner = 0; corner < model.nfaces() * 3; corner++) {
@@ -55,29 +59,154 @@ Camera fitted_camera(const std::vector<Model>& models, const vec3& direction, co
         // the largest coordinate, and screen_depth/2 * 2^-50 / 2^-24 is below a quarter of depth_rounding.
         if (i == 2) half = std::max(half, largest * 0x1p-24);
         if (!(half >= 0x1p-1000)) half = 1;  // no extent, or one whose inverse is no double: any scale will do
-        camera.Projection[i][i] = 1 / half;
-        camera.Projection[i][3] = -(low[i] + half) / half;
+        result.Projection[i][i] = 1 / half;
+        result.Projection[i][3] = -(low[i] + half) / half;
     }
-    return camera;
+    return result;
+}
+
+// ---- the z-buffer ----
+
+DepthBuffer::DepthBuffer(int width, int height) : w_(width), h_(height) {
+    if (w_ < 1 || h_ < 1 || w_ > max_size || h_ > max_size)
+        throw std::invalid_argument("a buffer has 1 to 16384 pixels a side");
+    cells_.assign(std::size_t{1} * w_ * h_, nothing);
 }
 
 TGAImage depth_picture(const DepthBuffer& depths) {
-    constexpr float nothing = -std::numeric_limits<float>::infinity();
     constexpr double darkest = 32, white = 255;
-    float far = std::numeric_limits<float>::infinity(), near = nothing;
+    float far = -DepthBuffer::nothing, near = DepthBuffer::nothing;
     for (int y = 0; y < depths.height(); y++)
         for (int x = 0; x < depths.width(); x++)
-            if (const float z = depths.row(y)[x]; z != nothing) far = std::min(far, z), near = std::max(near, z);
-    const double scale = near > far ? (white - darkest) / (static_cast<double>(near) - static_cast<double>(far)) : 0;
+            if (const float z = depths.row(y)[x]; z != DepthBuffer::nothing) far = std::min(far, z), near = std::max(near, z);
+    const double scale = near > far ? (white - darkest) / (double{near} - double{far}) : 0;
     TGAImage picture(depths.width(), depths.height(), TGAImage::GRAYSCALE);
     for (int y = 0; y < depths.height(); y++)
         for (int x = 0; x < depths.width(); x++)
-            if (const float z = depths.row(y)[x]; z != nothing)
-                *picture.pixel(x, y) = static_cast<std::uint8_t>(white - scale * (static_cast<double>(near) - static_cast<double>(z)));
+            if (const float z = depths.row(y)[x]; z != DepthBuffer::nothing)
+                *picture.pixel(x, y) = static_cast<std::uint8_t>(white - scale * (double{near} - double{z}));
     return picture;
 }
 
+// ---- shaders ----
+
+Texels::Texels(const TGAImage& map, const vec<2, real>& uv) {
+    const auto wrapped = [](const real& t, int size, int (&texel)[lanes]) {
+        const real f = t - floor(t);  // may round up to 1; no number where t is beyond the range of a double
+        for (int i = 0; i < lanes; i++) texel[i] = f[i] >= 0 ? std::min(static_cast<int>(f[i] * size), size - 1) : 0;
+    };
+    int x[lanes], y[lanes];
+    wrapped(uv.x, map.width(), x);
+    wrapped(uv.y, map.height(), y);
+    for (int i = 0; i < lanes; i++) at_[i] = map.pixel(x[i], y[i]);
+}
+
+real power(real base, const real& exponent) {
+    real result = 1, left = exponent;
+    while (any(left > 0.)) {
+        const real half = floor(left * .5);
+        result = select(left > half * 2, result * base, result);  // an odd exponent
+        base *= base;
+        left = half;
+    }
+    return result;
+}
+
+// ---- threads ----
+
 namespace {
+
+// Threads that wait for work. The one that asks for it works too.
+class Pool {
+public:
+    explicit Pool(int threads) {
+        try {
+            while (static_cast<int>(others_.size()) + 1 < threads)
+                others_.emplace_back([this, me = static_cast<int>(others_.size()) + 1] { wait_for_work(me); });
+        } catch (const std::system_error&) {
+            // no more threads to be had: those that run share the work
+        }
+    }
+    ~Pool() {
+        {
+            const std::lock_guard lock(mutex_);
+            ending_ = true;
+        }
+        start_.notify_all();
+    }
+
+    void run(int n, const std::function<void(int, int)>& work) {
+        {
+            const std::lock_guard lock(mutex_);
+            work_ = &work, n_ = n, next_ = 0, error_ = nullptr;
+            working_ = static_cast<int>(others_.size());
+            round_++;
+        }
+        start_.notify_all();
+        share(0);
+        std::unique_lock lock(mutex_);
+        done_.wait(lock, [this] { return working_ == 0; });
+        if (error_) std::rethrow_exception(error_);
+    }
+
+private:
+    void share(int me) {
+        try {
+            for (int i; (i = next_++) < n_;) (*work_)(i, me);
+        } catch (...) {
+            const std::lock_guard lock(mutex_);
+            error_ = std::current_exception();
+        }
+    }
+    void wait_for_work(int me) {
+        for (int seen = 0;;) {
+            {
+                std::unique_lock lock(mutex_);
+                start_.wait(lock, [&] { return ending_ || round_ != seen; });
+                if (ending_) return;
+                seen = round_;
+            }
+            share(me);
+            const std::lock_guard lock(mutex_);
+            if (--working_ == 0) done_.notify_one();
+        }
+    }
+
+    std::mutex mutex_;
+    std::condition_variable start_, done_;
+    const std::function<void(int, int)>* work_ = nullptr;
+    std::atomic<int> next_ = 0;
+    int n_ = 0, working_ = 0, round_ = 0;
+    bool ending_ = false;
+    std::exception_ptr error_;
+    std::vector<std::jthread> others_;  // last: they end before what they use
+};
+
+int& wanted_threads() {
+    static int n = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    return n;
+}
+
+}  // namespace
+
+void use_threads(int n) { wanted_threads() = n; }
+int thread_count() { return wanted_threads(); }
+
+void parallel_for(int n, const std::function<void(int, int)>& work) {
+    static std::optional<Pool> pool;
+    static int threads = 0;
+    if (threads != thread_count()) pool.reset(), pool.emplace(threads = thread_count());
+    pool->run(n, work);
+}
+
+// ---- a face on the screen ----
+
+namespace {
+
+// Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers; depth and barycentric coordinates
+// come from the corners as they are.
+constexpr int subpixel_bits = 16;
+constexpr int most_corners = 8;  // of a triangle cut by the near plane and four guard planes
 
 // The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the rounding of
 // a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then moves by
@@ -89,11 +218,44 @@ constexpr double w_near = 1. / (1 << 22);
 // cross the border need no clipping. 2 * 4096 + 16384 pixels at 16 sub-pixel bits make differences below 2^30.6.
 constexpr double guard = 4096;
 
-// Distances to the clipping planes, homogeneous; inside where >= 0. s is a corner in homogeneous screen coordinates.
+// A face in homogeneous screen coordinates, which may be scaled at will: near is the w of the near plane at their scale,
+// size their largest magnitude.
+struct Screen {
+    vec4 corner[3];
+    double size, near;
+};
+
+// False for a coordinate beyond the range of a double, which has no place on the screen.
+bool to_screen(const vec4 (&clip)[3], const mat4& Viewport, Screen& s) {
+    s.size = 0, s.near = w_near;
+    for (int i = 0; i < 3; i++) {
+        s.corner[i] = Viewport * clip[i];
+        for (int k = 0; k < 4; k++) {
+            if (!std::isfinite(s.corner[i][k])) return false;
+            s.size = std::max(s.size, std::fabs(s.corner[i][k]));
+        }
+    }
+    // Clipping adds up to 2^15 times the coordinates: a power of two, which is exact, keeps that in a double's range.
+    if (s.size > 0x1p1000) {
+        for (vec4& p : s.corner) p = p * 0x1p-40;
+        s.size *= 0x1p-40, s.near *= 0x1p-40;
+    }
+    return true;
+}
+
+// Whether the face is wholly behind the eye or beyond one side of the picture.
+bool is_outside(const Screen& s, int width, int height) {
+    const auto all = [&s](auto&& beyond) { return beyond(s.corner[0]) && beyond(s.corner[1]) && beyond(s.corner[2]); };
+    return all([&](const vec4& p) { return !(p.w >= s.near); }) || all([](const vec4& p) { return !(p.x > 0); }) ||
+           all([](const vec4& p) { return !(p.y > 0); }) || all([=](const vec4& p) { return !(p.x < width * p.w); }) ||
+           all([=](const vec4& p) { return !(p.y < height * p.w); });
+}
+
+// The clipping planes: near, and the four sides of the guard band.
 struct Planes {
     double near, right, top;
     static constexpr int count = 5;
-    double distance(int plane, const vec4& s) const {
+    double distance(int plane, const vec4& s) const {  // homogeneous; inside where >= 0
         switch (plane) {
             case 0: return s.w - near;
             case 1: return s.x + guard * s.w;
@@ -136,139 +298,384 @@ int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* o
     return m;
 }
 
-}  // namespace
-
-Setup setup_triangle(const vec4 (&clip)[3], const mat4& Viewport, int width, int height, TriangleSetup& t) {
-    vec4 s[3] = {Viewport * clip[0], Viewport * clip[1], Viewport * clip[2]};
-
-    for (const vec4& p : s)  // a coordinate beyond the range of a double has no place on the screen
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z) || !std::isfinite(p.w)) return Setup::outside;
-
-    // Homogeneous coordinates may be scaled: by a power of two, exactly. Distances to the planes are sums of up to 2^15 times
-    // the coordinates, which must not leave the range of a double.
-    double size = 0, near = w_near;
-    for (const vec4& p : s) size = std::max({size, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), std::fabs(p.w)});
-    if (size > 0x1p1000) {
-        for (vec4& p : s) p = p * 0x1p-40;
-        size *= 0x1p-40, near *= 0x1p-40;
-    }
-
-    // Wholly behind the eye or beyond one side of the picture.
-    const auto all = [&s](auto&& outside) { return outside(s[0]) && outside(s[1]) && outside(s[2]); };
-    if (all([=](const vec4& p) { return !(p.w >= near); }) || all([](const vec4& p) { return !(p.x > 0); }) ||
-        all([](const vec4& p) { return !(p.y > 0); }) || all([=](const vec4& p) { return !(p.x < width * p.w); }) ||
-        all([=](const vec4& p) { return !(p.y < height * p.w); }))
-        return Setup::outside;
-
-    // Clip against those planes that a corner is outside of.
-    const Planes planes{near, width + guard, height + guard};
-    vec4 buffer[2][TriangleSetup::max_corners];
-    vec4* polygon = buffer[0];
-    std::copy_n(s, 3, polygon);
+// Cuts the face to what is in front of the eye and inside the guard band; returns the number of corners, 0 for nothing.
+int clip(const Screen& s, int width, int height, vec4 (&polygon)[most_corners]) {
+    const Planes planes{s.near, width + guard, height + guard};
+    std::copy_n(s.corner, 3, polygon);
     int n = 3;
     for (int plane = 0; plane < Planes::count; plane++) {
-        if (!all([&](const vec4& p) { return planes.distance(plane, p) >= 0; })) {
-            vec4* const target = polygon == buffer[0] ? buffer[1] : buffer[0];
-            n = clip_polygon(planes, plane, polygon, n, target);
-            polygon = target;
-        }
+        const auto is_inside = [&](const vec4& p) { return planes.distance(plane, p) >= 0; };
+        if (is_inside(s.corner[0]) && is_inside(s.corner[1]) && is_inside(s.corner[2])) continue;
+        vec4 cut[most_corners];
+        n = clip_polygon(planes, plane, polygon, n, cut);
+        std::copy_n(cut, n, polygon);
     }
-    if (n < 3) return Setup::outside;
+    return n < 3 ? 0 : n;
+}
 
-    // Divide by w and snap.
-    constexpr double one = 1 << TriangleSetup::subpixel_bits;
-    constexpr std::int32_t half = 1 << (TriangleSetup::subpixel_bits - 1);
-    t.corners = n;
-    t.zmin = std::numeric_limits<double>::infinity();
-    t.zmax = -t.zmin;
-    std::int32_t lo[2] = {INT32_MAX, INT32_MAX}, hi[2] = {INT32_MIN, INT32_MIN};
+struct Point {
+    std::int32_t x, y;  // in 1/65536 pixel
+};
+
+// What a face covers: a convex polygon of n snapped corners, the pixels whose centres lie in its box, and its depth, which
+// is linear on the screen.
+struct Coverage {
+    int n, first;  // the corners, in a list of many
+    int xmin, xmax, ymin, ymax;
+    double zx, zy, z0;   // depth = zx (x - xmin) + zy (y - ymin) + z0 at the centre of the pixel (x,y) ...
+    double zmin, zmax;   // ... and no smaller or larger than those of its corners
+};
+
+// Divides by w and snaps; false where the polygon covers no pixel's centre.
+bool snap(const vec4* polygon, int n, int width, int height, Coverage& c, Point* corners) {
+    constexpr double one = 1 << subpixel_bits;
+    constexpr std::int32_t half = 1 << (subpixel_bits - 1);
+    c.n = n;
+    c.zmin = std::numeric_limits<double>::infinity(), c.zmax = -c.zmin;
+    Point low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};
     for (int i = 0; i < n; i++) {
         const vec3 p = project(polygon[i]);
         // On a guard plane rounding may land a hair outside: that is no more than 2^-10 of a sub-pixel.
-        t.x[i] = static_cast<std::int32_t>(std::floor(std::clamp(p.x, -guard, width + guard) * one + .5));
-        t.y[i] = static_cast<std::int32_t>(std::floor(std::clamp(p.y, -guard, height + guard) * one + .5));
-        lo[0] = std::min(lo[0], t.x[i]), hi[0] = std::max(hi[0], t.x[i]);
-        lo[1] = std::min(lo[1], t.y[i]), hi[1] = std::max(hi[1], t.y[i]);
-        t.zmin = std::min(t.zmin, p.z), t.zmax = std::max(t.zmax, p.z);
+        corners[i] = {static_cast<std::int32_t>(std::floor(std::clamp(p.x, -guard, width + guard) * one + .5)),
+                      static_cast<std::int32_t>(std::floor(std::clamp(p.y, -guard, height + guard) * one + .5))};
+        low = {std::min(low.x, corners[i].x), std::min(low.y, corners[i].y)};
+        high = {std::max(high.x, corners[i].x), std::max(high.y, corners[i].y)};
+        c.zmin = std::min(c.zmin, p.z), c.zmax = std::max(c.zmax, p.z);
     }
     // A depth beyond the range of a float is drawn as its largest one, not as infinity.
     constexpr double most = std::numeric_limits<float>::max();
-    t.zmin = std::clamp(t.zmin, -most, most), t.zmax = std::clamp(t.zmax, -most, most);
-    // Pixel x has its centre at x + half: the first at or right of lo, the last at or left of hi.
-    t.xmin = std::max(0, (lo[0] + half - 1) >> TriangleSetup::subpixel_bits);
-    t.ymin = std::max(0, (lo[1] + half - 1) >> TriangleSetup::subpixel_bits);
-    t.xmax = std::min(width - 1, (hi[0] - half) >> TriangleSetup::subpixel_bits);
-    t.ymax = std::min(height - 1, (hi[1] - half) >> TriangleSetup::subpixel_bits);
-    if (t.xmin > t.xmax || t.ymin > t.ymax) return Setup::between_samples;
+    c.zmin = std::clamp(c.zmin, -most, most), c.zmax = std::clamp(c.zmax, -most, most);
+    // Pixel x has its centre at x + half: the first at or right of low, the last at or left of high.
+    c.xmin = std::max(0, (low.x + half - 1) >> subpixel_bits);
+    c.ymin = std::max(0, (low.y + half - 1) >> subpixel_bits);
+    c.xmax = std::min(width - 1, (high.x - half) >> subpixel_bits);
+    c.ymax = std::min(height - 1, (high.y - half) >> subpixel_bits);
+    return c.xmin <= c.xmax && c.ymin <= c.ymax;
+}
 
-    // Perspective without a division per corner (Olano and Greer, "Triangle scan conversion using 2D homogeneous
-    // coordinates", 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are linear functions
-    // on the screen whose ratio is that of the barycentric coordinates on the face. They hold for the whole face, clipped or
-    // not, corners behind the eye included. Coordinates relative to a pixel of the face keep the products small.
-    // They are scaled again, so that no product leaves that range either.
-    if (!(size > 0x1p-200 && size < 0x1p200))
-        for (vec4& p : s)
-            for (int i = 0; i < 4; i++) p[i] = std::scalbn(p[i], -std::ilogb(size));
-    t.origin = {t.xmin + .5, t.ymin + .5};
+// Perspective without a division per corner (Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates",
+// 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are functions
+// ex dx + ey dy + e0 that are linear on the screen, and in the ratio of the barycentric coordinates on the face. They hold
+// for the whole face, clipped or not, corners behind the eye included. dx and dy are relative to the centre of the pixel
+// (xmin, ymin) of the face, which keeps the products small.
+struct Barycentric {
+    vec3 ex, ey, e0;
+};
+
+// Also completes c by the depth, sum(z_i e_i) / sum(w_i e_i): the denominator is |det| everywhere.
+Barycentric planes(Screen s, Coverage& c) {
+    // The products of three coordinates that follow stay within the range of a double for these sizes; others are scaled.
+    if (!(s.size > 0x1p-200 && s.size < 0x1p200))
+        for (vec4& p : s.corner)
+            for (int i = 0; i < 4; i++) p[i] = std::scalbn(p[i], -std::ilogb(s.size));
+    const vec4* const p = s.corner;
     vec3 v[3];
-    for (int i = 0; i < 3; i++) v[i] = {s[i].x - t.origin.x * s[i].w, s[i].y - t.origin.y * s[i].w, s[i].w};
+    for (int i = 0; i < 3; i++) v[i] = {p[i].x - (c.xmin + .5) * p[i].w, p[i].y - (c.ymin + .5) * p[i].w, p[i].w};
     vec3 e[3] = {cross(v[1], v[2]), cross(v[2], v[0]), cross(v[0], v[1])};
     const double det = dot(v[0], e[0]);
-    if (det != 0 && std::isfinite(det)) {
-        const double sign = det < 0 ? -1 : 1;
-        for (vec3& f : e) f = f * sign;
-        t.ex = {e[0].x, e[1].x, e[2].x};
-        t.ey = {e[0].y, e[1].y, e[2].y};
-        t.e0 = {e[0].z, e[1].z, e[2].z};
-        // depth = sum(z_i e_i) / sum(w_i e_i), and the denominator is |det| everywhere. Depths are taken relative to that
-        // of the corner farthest in front of the eye, so that a small slope is not the difference of large numbers.
-        const int r = s[0].w >= s[1].w ? (s[0].w >= s[2].w ? 0 : 2) : (s[1].w >= s[2].w ? 1 : 2);
-        const double z0 = s[r].z / s[r].w;
-        vec3 z{s[0].z - z0 * s[0].w, s[1].z - z0 * s[1].w, s[2].z - z0 * s[2].w};
-        z[r] = 0;
-        t.zx = dot(z, t.ex) / std::fabs(det);
-        t.zy = dot(z, t.ey) / std::fabs(det);
-        t.z0 = z0 + dot(z, t.e0) / std::fabs(det);
-    } else {
+    if (det == 0 || !std::isfinite(det)) {
         // Seen exactly edge-on, yet snapped to a sliver: its neighbours leave those samples to it. It shows corner 0.
-        t.ex = t.ey = {};
-        t.e0 = {1, 0, 0};
-        t.zx = t.zy = 0;
-        t.z0 = t.zmax;
+        c.zx = c.zy = 0, c.z0 = c.zmax;
+        return {{}, {}, {1, 0, 0}};
     }
-    return Setup::drawn;
+    if (det < 0)
+        for (vec3& f : e) f = -f;
+    const Barycentric b{{e[0].x, e[1].x, e[2].x}, {e[0].y, e[1].y, e[2].y}, {e[0].z, e[1].z, e[2].z}};
+    // Depths are taken relative to that of the corner farthest in front of the eye, so that a small slope is not the
+    // difference of large numbers.
+    const int r = p[0].w >= p[1].w ? (p[0].w >= p[2].w ? 0 : 2) : (p[1].w >= p[2].w ? 1 : 2);
+    const double z_r = p[r].z / p[r].w;
+    vec3 z{p[0].z - z_r * p[0].w, p[1].z - z_r * p[1].w, p[2].z - z_r * p[2].w};
+    z[r] = 0;
+    c.zx = dot(z, b.ex) / std::fabs(det);
+    c.zy = dot(z, b.ey) / std::fabs(det);
+    c.z0 = z_r + dot(z, b.e0) / std::fabs(det);
+    return b;
 }
 
-void triangle(const TriangleSetup& t, int number, DepthBuffer& zbuffer, FaceBuffer* faces, const Share& share, Counters& count) {
-    share.for_each_span(t, [&](int y, int x_begin, int x_end) {
+// ---- the pixels of a face ----
+
+// Calls visit(y, x_begin, x_end) for the pixels on the rows [y_begin, y_end) of the triangle of the corners 0, k-1 and k.
+// The edge function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies on
+// the edge and belongs to it if the edge is a left one (it runs down, counter-clockwise) or a top one (it runs left), so
+// that of two triangles sharing an edge exactly one owns the pixel. Range: with max_size pixels and the guard band,
+// differences of coordinates are below 2^30.6, edge functions below 2^62.2.
+template <class Visit>
+void for_each_span_of_fan(const Coverage& c, const Point* corners, int k, int y_begin, int y_end, Visit&& visit) {
+    using wide = std::int64_t;
+    constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
+    const Point &a = corners[0], &b = corners[k - 1], &d = corners[k];
+    const wide area = (wide{b.x} - a.x) * (wide{d.y} - a.y) - (wide{b.y} - a.y) * (wide{d.x} - a.x);
+    if (area == 0) return;
+    const Point* const corner[3] = {&a, area < 0 ? &d : &b, area < 0 ? &b : &d};
+    wide row[3], step_x[3], step_y[3];
+    for (int i = 0; i < 3; i++) {
+        const Point &p = *corner[i], &q = *corner[(i + 1) % 3];
+        const wide dx = wide{q.x} - p.x, dy = wide{q.y} - p.y;
+        const bool top_left = dy < 0 || (dy == 0 && dx < 0);
+        row[i] = dx * (y_begin * one + half - p.y) - dy * (c.xmin * one + half - p.x) - (top_left ? 0 : 1);
+        step_x[i] = -dy * one;
+        step_y[i] = dx * one;
+    }
+    for (int y = y_begin; y < y_end; y++) {
+        wide e0 = row[0], e1 = row[1], e2 = row[2];
+        int x = c.xmin;
+        while (x <= c.xmax && (e0 | e1 | e2) < 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
+        const int first = x;
+        while (x <= c.xmax && (e0 | e1 | e2) >= 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
+        if (x > first) visit(y, first, x);
+        for (int i = 0; i < 3; i++) row[i] += step_y[i];
+    }
+}
+
+// Calls visit(y, x_begin, x_end) for the pixels of a face on the rows [y_begin, y_end), each once. The polygon is a fan of
+// triangles; nearly always there is one.
+template <class Visit>
+void for_each_span(const Coverage& c, const Point* corners, int y_begin, int y_end, Visit&& visit) {
+    y_begin = std::max(y_begin, c.ymin);
+    y_end = std::min(y_end, c.ymax + 1);
+    if (c.n == 3) return for_each_span_of_fan(c, corners, 2, y_begin, y_end, visit);
+    // Snapping and clipping round: a cut polygon may be convex but for a hair, and then its fan overlaps itself.
+    for (int y = y_begin; y < y_end; y++) {
+        std::pair<int, int> spans[most_corners];
+        int n = 0;
+        for (int k = 2; k < c.n; k++)
+            for_each_span_of_fan(c, corners, k, y, y + 1, [&](int, int begin, int end) {
+                int i = n++;  // from left to right
+                for (; i > 0 && spans[i - 1].first > begin; i--) spans[i] = spans[i - 1];
+                spans[i] = {begin, end};
+            });
+        for (int i = 0; i < n;) {
+            auto [begin, end] = spans[i++];
+            for (; i < n && spans[i].first <= end; i++) end = std::max(end, spans[i].second);
+            visit(y, begin, end);
+        }
+    }
+}
+
+// ---- drawing ----
+
+// The picture is drawn in strips of rows, each by one thread from the first face to the last: so a pixel sees the faces in
+// their order, and a strip's face numbers stay in the cache of its processor.
+constexpr int strip_rows = 16;
+
+struct Face : Coverage {
+    int shader, iface, number;
+};
+
+// Some consecutive faces, prepared by one thread, and for each strip those that touch it.
+struct Block {
+    std::vector<Face> faces;
+    std::vector<Point> corners;
+    std::vector<int> first, touching;  // those of strip s: touching[first[s]] to touching[first[s + 1]]
+    Counters count;
+
+    void add(IShader& shader, int shader_number, int iface, int number, const mat4& Viewport, int width, int height) {
+        const vec4 in_clip[3] = {shader.vertex(iface, 0), shader.vertex(iface, 1), shader.vertex(iface, 2)};
+        Screen screen;
+        vec4 polygon[most_corners];
+        Point snapped[most_corners];
+        Face face;
+        count.triangles++;
+        int n = 0;
+        if (to_screen(in_clip, Viewport, screen) && !is_outside(screen, width, height)) n = clip(screen, width, height, polygon);
+        if (n == 0) count.outside++;
+        else if (!snap(polygon, n, width, height, face, snapped)) count.between_samples++;
+        else {
+            planes(screen, face);
+            face.first = static_cast<int>(corners.size());
+            face.shader = shader_number, face.iface = iface, face.number = number;
+            corners.insert(corners.end(), snapped, snapped + n);
+            faces.push_back(face);
+        }
+    }
+    void sort_into_strips(int strips) {
+        first.assign(strips + 2, 0);
+        const auto for_each_touch = [&](auto&& visit) {
+            for (int i = 0; i < static_cast<int>(faces.size()); i++)
+                for (int s = faces[i].ymin / strip_rows; s <= faces[i].ymax / strip_rows; s++) visit(s, i);
+        };
+        for_each_touch([&](int s, int) { first[s + 2]++; });
+        for (int s = 0; s < strips; s++) first[s + 2] += first[s + 1];
+        touching.resize(first[strips + 1]);
+        for_each_touch([&](int s, int i) { touching[first[s + 1]++] = i; });
+    }
+};
+
+// Draws a face into the rows of the strip from y_begin on; where it is nearest, nearest (if given) gets its mark. Returns
+// the number of samples.
+long triangle(const Face& face, const Point* corners, int y_begin, DepthBuffer& zbuffer, std::int32_t* nearest, int mark) {
+    long covered = 0;
+    for_each_span(face, corners, y_begin, y_begin + strip_rows, [&](int y, int x_begin, int x_end) {
         float* const depth = zbuffer.row(y);
-        std::int32_t* const face = faces ? faces->row(y) : nullptr;
-        count.covered += x_end - x_begin;
+        std::int32_t* const row = nearest ? nearest + std::ptrdiff_t{zbuffer.width()} * (y - y_begin) : nullptr;
+        const double z_row = face.zy * (y - face.ymin) + face.z0;
+        covered += x_end - x_begin;
         for (int x = x_begin; x < x_end; x++) {
-            const float z = static_cast<float>(t.depth(x, y));
+            const auto z = static_cast<float>(std::clamp(face.zx * (x - face.xmin) + z_row, face.zmin, face.zmax));
             if (!(z > depth[x])) continue;
             depth[x] = z;
-            if (face) face[x] = number;
-            count.nearer++;
+            if (row) row[x] = mark;
         }
     });
+    return covered;
 }
 
-std::vector<char> numbers_seen(const FaceBuffer& faces, int count) {
-    std::vector<char> seen(static_cast<std::size_t>(count));
-    for (int y = 0; y < faces.height(); y++)
-        for (int x = 0; x < faces.width(); x++)
-            if (const std::int32_t number = faces.row(y)[x]; number >= 0) seen[static_cast<std::size_t>(number)] = 1;
-    return seen;
+struct Pixel {
+    std::int32_t x, y;
+};
+
+// Colours n pixels of a face, as many at once as there are lanes.
+void shade(const Face& face, const Pixel* pixels, int n, IShader& shader, const mat4& Viewport, TGAImage& picture) {
+    const vec4 in_clip[3] = {shader.vertex(face.iface, 0), shader.vertex(face.iface, 1), shader.vertex(face.iface, 2)};
+    Screen screen;
+    Coverage c = face;
+    to_screen(in_clip, Viewport, screen);
+    const Barycentric b = planes(screen, c);
+    for (int first = 0; first < n; first += lanes) {
+        double xs[lanes], ys[lanes];
+        for (int i = 0; i < lanes; i++) {  // where pixels run out, the last one fills the lanes
+            const Pixel& p = pixels[std::min(first + i, n - 1)];
+            xs[i] = p.x, ys[i] = p.y;
+        }
+        const real x(xs), y(ys), dx = x - face.xmin, dy = y - face.ymin;
+        Fragment f;
+        f.face = face.number;
+        f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
+        // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
+        for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
+        const real sum = f.bar.x + f.bar.y + f.bar.z;
+        for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
+        const Color color = shader.fragment(f);
+        for (int channel = 0; channel < 3; channel++) {
+            double value[lanes];
+            min(color[channel], 255.).store(value);
+            for (int i = 0; i < lanes && first + i < n; i++)
+                picture.pixel(pixels[first + i].x, pixels[first + i].y)[channel] = static_cast<std::uint8_t>(value[i]);
+        }
+    }
+}
+
+using Shaders = std::function<IShader&(int i, int thread)>;
+
+// What a thread needs for a strip, kept from one to the next.
+struct Workspace {
+    std::vector<std::int32_t> nearest;  // of the strip's pixels: the mark of the face, -1 for none
+    std::vector<int> seen;              // pixels that show the face with this mark, summed up: where its list of pixels ends
+    std::vector<Pixel> pixels;
+    Counters count;
+};
+
+void draw_strip(const std::vector<Block>& blocks, int strip, int thread, const Shaders& shader, const mat4& Viewport,
+                DepthBuffer& zbuffer, TGAImage* picture, Workspace& w) {
+    const int y_begin = strip * strip_rows, rows = std::min(strip_rows, zbuffer.height() - y_begin), width = zbuffer.width();
+    if (picture) w.nearest.assign(std::size_t{1} * width * rows, -1);
+    const auto for_each_face = [&](auto&& visit) {
+        int mark = 0;
+        for (const Block& b : blocks)
+            for (int i = b.first[strip]; i < b.first[strip + 1]; i++) visit(b, b.faces[b.touching[i]], mark++);
+        return mark;
+    };
+    const int faces = for_each_face([&](const Block& b, const Face& face, int mark) {
+        w.count.covered += triangle(face, &b.corners[face.first], y_begin, zbuffer, picture ? w.nearest.data() : nullptr, mark);
+    });
+    if (!picture) return;
+
+    // The pixels sorted by face: counted, summed up, filled in.
+    w.seen.assign(faces + 1, 0);
+    for (const std::int32_t mark : w.nearest) w.seen[mark + 1]++;
+    w.seen[0] = 0;
+    for (int i = 0; i < faces; i++) w.seen[i + 1] += w.seen[i];
+    w.pixels.resize(w.seen[faces]);
+    for (int y = 0; y < rows; y++)
+        for (int x = 0; x < width; x++)
+            if (const std::int32_t mark = w.nearest[std::size_t{1} * width * y + x]; mark >= 0)
+                w.pixels[w.seen[mark]++] = {x, y_begin + y};
+    int done = 0;
+    for_each_face([&](const Block&, const Face& face, int mark) {
+        const int n = w.seen[mark] - done;
+        if (n > 0) shade(face, &w.pixels[done], n, shader(face.shader, thread), Viewport, *picture);
+        done += n;
+    });
+    w.count.shaded += done;
+}
+
+}  // namespace
+
+Counters& Counters::operator+=(const Counters& c) {
+    triangles += c.triangles, outside += c.outside, between_samples += c.between_samples;
+    covered += c.covered, shaded += c.shaded;
+    return *this;
+}
+
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer, TGAImage* picture) {
+    assert(!picture || (picture->width() == zbuffer.width() && picture->height() == zbuffer.height()));
+    std::vector<int> first{0};  // the number of each shader's first face
+    for (int i = 0; i < nshaders; i++) first.push_back(first[i] + shader(i, 0).end - shader(i, 0).begin);
+    const int faces = first.back(), strips = (zbuffer.height() + strip_rows - 1) / strip_rows;
+
+    // A thread gets several blocks, in case that some take longer than others, but none is worth fewer than some faces.
+    constexpr int blocks_per_thread = 8, least_faces = 64;
+    std::vector<Block> blocks(std::clamp(faces / least_faces, 1, blocks_per_thread * thread_count()));
+    const auto nblocks = static_cast<std::int64_t>(blocks.size());
+    parallel_for(static_cast<int>(nblocks), [&](int b, int thread) {
+        int s = 0;
+        for (auto number = static_cast<int>(faces * std::int64_t{b} / nblocks); number < faces * (b + std::int64_t{1}) / nblocks; number++) {
+            while (number >= first[s + 1]) s++;
+            IShader& own = shader(s, thread);
+            blocks[b].add(own, s, own.begin + number - first[s], number, Viewport, zbuffer.width(), zbuffer.height());
+        }
+        blocks[b].sort_into_strips(strips);
+    });
+    std::vector<Workspace> spaces(thread_count());
+    parallel_for(strips, [&](int strip, int thread) {
+        draw_strip(blocks, strip, thread, shader, Viewport, zbuffer, picture, spaces[thread]);
+    });
+    Counters total;
+    for (const Block& b : blocks) total += b.count;
+    for (const Workspace& w : spaces) total += w.count;
+    return total;
+}
+
+// ---- shadows ----
+
+// The buffer knows depths at the centres of its texels only. Both terms say how much of a height above the fragment means
+// nothing; what stands higher than either throws a shadow.
+// - The receiver: its own plane, at the centre of the texel that the fragment lies in. If nothing is above it there the
+//   fragment is lit: no face shadows itself, at any angle.
+// - The caster: what is above may fall, on its way from there to the fragment, as far as to the next texel's depth. Along
+//   each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are lower, half.
+// And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most; coverage is snapped
+// by half a sub-pixel.
+real derived_bias(const DepthBuffer& shadowbuffer, const vec<3, real>& sb_p, const vec3 (&face)[3]) {
+    constexpr double depth_rounding = 1. / (1 << 14);
+    const vec3 n = cross(face[1] - face[0], face[2] - face[0]);
+    const vec2 slope{-n.x / n.z, -n.y / n.z};  // of the face's depth, per texel along x and y
+    const vec<2, real> to_centre{floor(sb_p.x) + .5 - sb_p.x, floor(sb_p.y) + .5 - sb_p.y};
+    const real rounding = depth_rounding + (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
+    const real receiver = dot(slope, to_centre), stored = shadowbuffer.at(sb_p);
+    if (!any(stored > sb_p.z + (receiver + rounding))) return receiver + rounding;
+
+    const auto depth = [&](double dx, double dy) { return shadowbuffer.at(vec<3, real>{sb_p.x + dx, sb_p.y + dy, sb_p.z}); };
+    const auto fall = [&](const real& a, const real& b) {
+        return min(abs(stored - a), abs(stored - b)) / select((a < stored) & (b < stored), 2., 1.);
+    };
+    const real caster = fall(depth(-1, 0), depth(1, 0)) + fall(depth(0, -1), depth(0, 1));
+    return max(receiver, caster) + rounding;
+}
+
+int LightGrid::good_cells(const std::vector<Model>& models) {
+    int faces = 0;
+    for (const Model& model : models) faces += model.nfaces();
+    return std::clamp(static_cast<int>(std::sqrt(faces)), 1, 2048);
 }
 
 LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int cells) : cells_(cells) {
-    const int faces = face_count(models);
-    corners_.reserve(static_cast<std::size_t>(faces) * 3);
-    const mat4 to_screen = light.object_to_screen();
+    const mat4 to_screen = light.to_screen();
     for (const Model& model : models)
         for (int corner = 0; corner < model.nfaces() * 3; corner++)
             corners_.push_back(project(to_screen * point(model.vert(corner / 3, corner % 3))));
+    const int faces = static_cast<int>(corners_.size() / 3);
     const auto cell_of = [&](double v) { return v > 0 ? static_cast<int>(std::min(v, cells_ - 1.)) : 0; };  // NaN: 0
     // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a face,
     // the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of faces.
@@ -276,7 +683,7 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
     const auto box_cells = [&] {
         double sum = 0;
         for (int f = 0; f < faces; f++) {
-            const vec3* const p = &corners_[static_cast<std::size_t>(f) * 3];
+            const vec3* const p = &corners_[std::size_t{3} * f];
             const auto [x0, x1] = std::minmax({p[0].x, p[1].x, p[2].x});
             const auto [y0, y1] = std::minmax({p[0].y, p[1].y, p[2].y});
             sum += ((x1 - x0) * scale_ + 1) * ((y1 - y0) * scale_ + 1);
@@ -289,7 +696,7 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
     // The cells that a face touches: those of its box that lie on the inner side of its three edges, at least in part.
     // A face that the light sees edge-on casts no shadow.
     const auto for_each_cell = [&](int face, auto&& visit) {
-        const vec3* const p = &corners_[static_cast<std::size_t>(face) * 3];
+        const vec3* const p = &corners_[std::size_t{3} * face];
         const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
         if (!(std::fabs(area) > 0)) return;  // nor one beyond the range of a double
         const double side = area < 0 ? -1 : 1;
@@ -305,18 +712,18 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
                     const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
                     outside = nx * dx + ny * dy < -(std::fabs(nx * dx) + std::fabs(ny * dy)) * 0x1p-48;
                 }
-                if (!outside) visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(x));
+                if (!outside) visit(std::size_t{1} * cells_ * y + x);
             }
         }
     };
     // Count, sum up, fill: a list for each cell in one array.
-    const std::size_t count = static_cast<std::size_t>(cells_) * static_cast<std::size_t>(cells_);
+    const std::size_t count = std::size_t{1} * cells_ * cells_;
     first_.assign(count + 2, 0);
     for (int f = 0; f < faces; f++) for_each_cell(f, [&](std::size_t c) { first_[c + 2]++; });
     for (std::size_t c = 2; c < first_.size(); c++) first_[c] += first_[c - 1];
     entries_.resize(first_.back());
     for (int f = 0; f < faces; f++) {
-        const vec3* const p = &corners_[static_cast<std::size_t>(f) * 3];
+        const vec3* const p = &corners_[std::size_t{3} * f];
         const float zmax = std::nextafter(static_cast<float>(std::max({p[0].z, p[1].z, p[2].z})), INFINITY);
         for_each_cell(f, [&](std::size_t c) { entries_[first_[c + 1]++] = {zmax, f}; });
     }
@@ -335,19 +742,25 @@ std::size_t LightGrid::bytes() const {
 bool LightGrid::shadows(const vec3& on_screen, int number) const {
     const vec3 p{on_screen.x * scale_, on_screen.y * scale_, on_screen.z};
     if (!(p.x >= 0 && p.y >= 0 && p.x < cells_ && p.y < cells_)) return false;  // beside all casters
-    const std::size_t c = static_cast<std::size_t>(p.y) * static_cast<std::size_t>(cells_) + static_cast<std::size_t>(p.x);
+    const std::size_t c = std::size_t{1} * cells_ * static_cast<int>(p.y) + static_cast<int>(p.x);
     for (std::uint32_t i = first_[c]; i < first_[c + 1]; i++) {
         const Entry& e = entries_[i];
-        if (static_cast<double>(e.zmax) <= p.z) return false;  // nor do those that follow reach higher
+        if (double{e.zmax} <= p.z) return false;  // nor do those that follow reach higher
         if (e.face != number && covers(e.face, p)) return true;
     }
     return false;
 }
 
+mask LightGrid::shadows(const vec<3, real>& on_screen, int number) const {
+    double dark[lanes];
+    for (int i = 0; i < lanes; i++) dark[i] = shadows(vec3{on_screen.x[i], on_screen.y[i], on_screen.z[i]}, number);
+    return real(dark) > 0.;
+}
+
 // Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are the
 // barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls through.
 bool LightGrid::covers(int face, const vec3& p) const {
-    const vec3* const q = &corners_[static_cast<std::size_t>(face) * 3];
+    const vec3* const q = &corners_[std::size_t{3} * face];
     const vec3 a = q[0] - p, b = q[1] - p, c = q[2] - p;
     const double u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
     const bool left = u >= 0 && v >= 0 && w >= 0, right = u <= 0 && v <= 0 && w <= 0;

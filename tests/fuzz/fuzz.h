@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
@@ -27,6 +28,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 [[noreturn]] inline void refuse(const std::string& what) {
     std::fprintf(stderr, "%s\n", what.c_str());
     std::abort();
+}
+
+int umbra_main(int argc, char** argv);  // main.cpp, compiled under this name: the whole program in this process
+
+inline int run_umbra(std::vector<std::string> words) {
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    return umbra_main(static_cast<int>(words.size()), arguments.data());
 }
 
 // A message for the user is one line: not empty, and nothing in it that moves the cursor.

@@ -3,16 +3,15 @@
 // number of threads changes nothing.
 //
 // The input is read from front to back by class Input; where it ends, zeros follow. The first byte says whether the
-// faces go straight into the pipeline or as a model through the two passes of the lesson, and whether there are enough
+// faces go straight into the pipeline or as a model through the whole program, and whether there are enough
 // of them for three threads: for that it must be 'T' or 'U', since such an input takes a hundred times as long as
 // another.
-#include "lesson.h"
+#include "drawing.h"
 #include "fuzz.h"
 
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 namespace {
 
@@ -87,79 +86,33 @@ int read_side(Input& in) {
 
 // ---- faces straight into the pipeline ----
 
-struct ClipShader final : IShader {
-    const std::vector<vec4>& clip;
-    const std::vector<Corners>& faces;
-    int current = 0;
-    ClipShader(const std::vector<vec4>& c, const std::vector<Corners>& f) : clip(c), faces(f) {}
-
-    vec4 vertex(int face, int corner) override {
-        current = face;
-        const Corners& f = faces[static_cast<std::size_t>(face)];
-        return clip[static_cast<std::size_t>(f.index[static_cast<std::size_t>(corner)])];
-    }
-    TGAColor fragment(const Fragment& f) const override {
-        // Three quotients by a sum that is itself rounded twice: each off by half a unit in the last place of 1 at
-        // most.
-        REQUIRE(f.bar.x >= 0 && f.bar.y >= 0 && f.bar.z >= 0);
-        REQUIRE(std::fabs(f.bar.x + f.bar.y + f.bar.z - 1) <= 4 * std::numeric_limits<double>::epsilon());
-        REQUIRE(std::isfinite(f.screen.x) && std::isfinite(f.screen.y) && std::isfinite(f.screen.z));
-        return {{static_cast<std::uint8_t>(current), static_cast<std::uint8_t>(f.bar.x * 255),
-                 static_cast<std::uint8_t>(f.bar.y * 255), 255}};
+struct CheckingShader final : ClipShader {
+    using ClipShader::ClipShader;
+    Color fragment(const Fragment& f) const override {
+        for (int i = 0; i < lanes; i++) {
+            // Three quotients by a sum that is itself rounded twice: each is off by half a unit in the last place of 1
+            // at most.
+            const vec3 bar{f.bar.x[i], f.bar.y[i], f.bar.z[i]};
+            REQUIRE(bar.x >= 0 && bar.y >= 0 && bar.z >= 0);
+            REQUIRE(std::fabs(bar.x + bar.y + bar.z - 1) <= 4 * std::numeric_limits<double>::epsilon());
+            REQUIRE(std::isfinite(f.screen.x[i]) && std::isfinite(f.screen.y[i]) && std::isfinite(f.screen.z[i]));
+        }
+        return ClipShader::fragment(f);
     }
 };
 
-struct Drawn {
-    DepthBuffer depths;
-    FaceBuffer faces;
-    TGAImage picture;
-    Counters count;
-};
-
-Drawn draw(const ClipShader& shader, const mat4& Viewport, int width, int height, int threads) {
-    const int n = static_cast<int>(shader.faces.size());
-    Drawn d{DepthBuffer(width, height), FaceBuffer(width, height), TGAImage(width, height, TGAImage::RGBA), {}};
-    d.count = draw_depth(n, shader, Viewport, d.depths, &d.faces, 0, threads);
-    d.count.shaded = draw_color(0, n, shader, Viewport, d.faces, numbers_seen(d.faces, n), 0, d.picture, threads);
-    return d;
-}
-
-bool same(const Counters& a, const Counters& b) {
-    return a.triangles == b.triangles && a.outside == b.outside && a.between_samples == b.between_samples &&
-           a.covered == b.covered && a.nearer == b.nearer && a.shaded == b.shaded;
-}
-
-template <class T>
-bool same(const Buffer<T>& a, const Buffer<T>& b) {
-    return a.bytes() == b.bytes() && (a.bytes() == 0 || std::memcmp(a.row(0), b.row(0), a.bytes()) == 0);
-}
-
-bool same(const TGAImage& a, const TGAImage& b) {
-    const auto bytes = static_cast<std::size_t>(a.width() * a.bytespp()) * static_cast<std::size_t>(a.height());
-    return a.width() == b.width() && a.height() == b.height() && std::memcmp(a.pixel(0, 0), b.pixel(0, 0), bytes) == 0;
-}
-
-// Depth and face of each pixel belong together; returns how many show a face.
-long check_buffers(const DepthBuffer& depths, const FaceBuffer& faces, int face_count) {
-    long seen = 0;
-    for (int y = 0; y < depths.height(); y++) {
-        for (int x = 0; x < depths.width(); x++) {
-            const float depth = depths.row(y)[x];
-            const std::int32_t face = faces.row(y)[x];
-            REQUIRE(std::isfinite(depth) || depth == -std::numeric_limits<float>::infinity());
-            REQUIRE(face >= -1 && face < face_count);
-            REQUIRE((face == -1) == !std::isfinite(depth));
-            seen += face >= 0;
+void check(const Drawing& d, long faces) {
+    for (int y = 0; y < d.height(); y++) {
+        for (int x = 0; x < d.width(); x++) {
+            REQUIRE(std::isfinite(d.z.row(y)[x]) || !d.drawn(x, y));
+            REQUIRE(d.face(x, y) >= -1 && d.face(x, y) < faces && (d.face(x, y) >= 0) == d.drawn(x, y));
         }
     }
-    return seen;
-}
-
-void check_counters(const Counters& count, long faces, long seen) {
+    depth_picture(d.z);
+    const Counters& count = d.count;
     REQUIRE(count.triangles == faces);
     REQUIRE(count.outside >= 0 && count.between_samples >= 0 && count.outside + count.between_samples <= faces);
-    REQUIRE(count.covered >= count.nearer && count.nearer >= seen);
-    REQUIRE(count.shaded == seen);
+    REQUIRE(count.covered >= d.seen() && count.shaded == d.seen());
 }
 
 void draw_faces(Input& in, bool many) {
@@ -185,24 +138,24 @@ void draw_faces(Input& in, bool many) {
         default: for (int i = 0; i < 16; i++) camera.Viewport[i / 4][i % 4] = in.number();
     }
     std::vector<vec4> clip(static_cast<std::size_t>(3 + in.upto(30)));
-    const mat4 to_clip = camera.object_to_clip();
+    const mat4 to_clip = camera.to_clip();
     for (vec4& v : clip) {
         const double x = in.number(), y = in.number(), z = in.number(), w = flags & 16 ? in.number() : 1;
         v = to_clip * vec4{x, y, z, w};
     }
-    const std::vector<Corners> faces = read_faces(in, static_cast<int>(clip.size()), many);
-    const ClipShader shader(clip, faces);
+    std::vector<vec4> corners;
+    for (const Corners& f : read_faces(in, static_cast<int>(clip.size()), many))
+        for (const int i : f.index) corners.push_back(clip[i]);
 
-    const Drawn one = draw(shader, camera.Viewport, width, height, 1);
-    const int n = static_cast<int>(faces.size());
-    check_counters(one.count, n, check_buffers(one.depths, one.faces, n));
+    use_threads(1);
+    const Drawing one = drawing(CheckingShader(corners), width, height, camera.Viewport);
+    check(one, static_cast<long>(corners.size() / 3));
     if (!many) return;
-    const Drawn three = draw(shader, camera.Viewport, width, height, 3);
-    REQUIRE(same(one.depths, three.depths) && same(one.faces, three.faces) && same(one.picture, three.picture));
-    REQUIRE(same(one.count, three.count));
+    use_threads(3);
+    REQUIRE(same(one, drawing(CheckingShader(corners), width, height, camera.Viewport)));
 }
 
-// ---- the faces as a model, through the lesson ----
+// ---- the faces as a model, through the program ----
 
 // Seventeen digits give the same double back.
 void append(std::string& text, const char* word, std::initializer_list<double> numbers) {
@@ -212,9 +165,7 @@ void append(std::string& text, const char* word, std::initializer_list<double> n
     text += '\n';
 }
 
-Model read_model(Input& in, bool many, bool with_uv, bool with_normals) {
-    static const TemporaryFolder folder("fuzz_pipeline");
-    static ScratchFile file(folder / "faces.obj");
+std::string read_model(Input& in, bool many, bool with_uv, bool with_normals) {
     constexpr double most = std::numeric_limits<double>::max();
     std::string text;
     const int vertices = 3 + in.upto(30);
@@ -240,13 +191,12 @@ Model read_model(Input& in, bool many, bool with_uv, bool with_normals) {
         }
         text += '\n';
     }
-    file.assign(text);
-    return Model(file.path());
+    return text;
 }
 
-void check_grid(Input& in, const std::vector<Model>& models, const Options& opt) {
-    const int faces = face_count(models), cells = 1 + in.upto(64);
-    const Camera light = fitted_camera(models, opt.light, opt.up, cells);
+void check_grid(Input& in, const std::vector<Model>& models, const vec3& to_light, const vec3& up) {
+    const int faces = models[0].nfaces(), cells = 1 + in.upto(64);
+    const Camera light = fitted({lookat(to_light, {}, up)}, models, cells);
     double largest = 0;
     for (const vec3& v : models[0].verts())
         largest = std::max({largest, std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
@@ -259,7 +209,7 @@ void check_grid(Input& in, const std::vector<Model>& models, const Options& opt)
         // All casters are on the light's screen, but for what a few roundings move a corner; a NaN is beside them all.
         const double rounding = 8 * cells * std::numeric_limits<double>::epsilon();
         const double low = -rounding, high = cells + rounding;
-        const bool dark = grid.shadows({x, y, z}, in.upto(static_cast<unsigned>(faces)));
+        const bool dark = grid.shadows(vec3{x, y, z}, in.upto(static_cast<unsigned>(faces)));
         REQUIRE(!dark || (x >= low && y >= low && x <= high && y <= high));
     }
     // 64 places in lists for each face and its three corners; a box of the mean size touches up to 81 cells, not 64.
@@ -267,49 +217,57 @@ void check_grid(Input& in, const std::vector<Model>& models, const Options& opt)
     REQUIRE(grid.bytes() <= n * (3 * sizeof(vec3) + 81 * 8) + lists * 4);
 }
 
+// Numbers that give the same doubles back.
+std::string exactly(const char* format, const vec3& v) {
+    char text[120];
+    std::snprintf(text, sizeof text, format, v.x, v.y, v.z);
+    return text;
+}
+
 void draw_lesson(Input& in, bool many) {
+    static const TemporaryFolder folder("fuzz_pipeline");
+    static ScratchFile file(folder / "faces.obj");
     const unsigned flags = in.byte(), more = in.byte();
-    Options opt;
-    opt.threads = 1;
-    opt.width = 1 + in.upto(many ? 8 : 16);
-    opt.height = 1 + in.upto(many ? 48 : 16);
-    opt.shadow_size = 1 + in.upto(16);
-    if (flags & 1) opt.eye = in.vector(1e307), opt.center = in.vector(1e307);
-    if (flags & 2) opt.up = in.vector(1e307);
-    if (flags & 4) opt.light = in.vector(1e307);
-    opt.shadow = static_cast<Options::Shadow>((flags >> 3 & 3) % 3);
-    if (more & 1) opt.bias = in.finite(std::numeric_limits<double>::max());
-    if (opt.eye == opt.center || opt.light == vec3{}) return;  // the command line refuses them
-
-    std::vector<Model> models;
-    models.push_back(read_model(in, many, more & 2, more & 4));
-    if (!(more & 8)) models.back().fit();
-    models.back().move(-opt.center);
-    if (more & 16) check_grid(in, models, opt);
-
-    const vec3 eye = opt.eye - opt.center;
-    const Camera viewer{lookat(eye, {}, opt.up), projection(-1 / norm(eye)), middle_viewport(opt.width, opt.height)};
-    Scene scene{opt, std::move(models), viewer};
-    Picture one;
-    const AnyShadow shadow = first_pass(scene, one);
-    second_pass(scene, shadow, one);
-    const int faces = face_count(scene.models);
-    check_counters(one.count, faces, check_buffers(one.zbuffer, one.faces, faces));
-    for (int y = 0; y < one.shadowbuffer.height(); y++)
-        for (int x = 0; x < one.shadowbuffer.width(); x++) {
-            const float depth = one.shadowbuffer.row(y)[x];
-            REQUIRE(std::isfinite(depth) || depth == -std::numeric_limits<float>::infinity());
+    const int width = 1 + in.upto(many ? 8 : 16), height = 1 + in.upto(many ? 48 : 16);
+    std::vector<std::string> words{"umbra", "--quiet", "-o", folder.path().string()};
+    const auto option = [&](const char* name, const std::string& value) { words.insert(words.end(), {name, value}); };
+    option("--size", std::to_string(width) + "x" + std::to_string(height));
+    option("--shadow-size", std::to_string(1 + in.upto(16)));
+    vec3 eye{1, 1, 4}, center, up{0, 1, 0}, light{1, 1, 0};
+    if (flags & 1) eye = in.vector(1e307), center = in.vector(1e307);
+    if (flags & 2) up = in.vector(1e307);
+    if (flags & 4) light = in.vector(1e307);
+    for (const auto& [name, v] : {std::pair("--eye", eye), {"--center", center}, {"--up", up}, {"--light", light}}) {
+        if (!(norm(v) <= 1e307)) return;  // the command line refuses it
+        option(name, exactly("%.17g,%.17g,%.17g", v));
+    }
+    option("--shadow", std::array{"map", "exact", "off"}[(flags >> 3 & 3) % 3]);
+    if (more & 1) option("--bias", exactly("%.17g", {in.finite(std::numeric_limits<double>::max()), 0, 0}));
+    file.assign(read_model(in, many, more & 2, more & 4));
+    if (more & 8) words.push_back("--no-fit");
+    if (more & 16 && !(light == vec3{})) {
+        std::vector<Model> models;
+        models.emplace_back(file.path());
+        if (!(more & 8)) models[0].fit();
+        models[0].move(-center);
+        check_grid(in, models, light, up);
+    }
+    words.push_back(file.path().string());
+    const bool refused = !std::isfinite(1 / norm(eye - center)) || light == vec3{};
+    Bytes pictures[2];
+    for (const int threads : {1, 3}) {
+        option("--threads", std::to_string(threads));
+        REQUIRE(run_umbra(words) == (refused ? 2 : 0));
+        if (refused) return;
+        Bytes& bytes = pictures[threads == 3];
+        for (const char* name : {"framebuffer.tga", "depth.tga"}) {
+            if (!std::filesystem::exists(folder / name)) continue;
+            const Bytes part = read_bytes(folder / name);
+            bytes.insert(bytes.end(), part.begin(), part.end());
         }
-    if (one.shadowbuffer.width()) depth_picture(one.shadowbuffer);
-    depth_picture(one.zbuffer);
-    if (!many) return;
-    scene.opt.threads = 3;
-    Picture three;
-    const AnyShadow again = first_pass(scene, three);
-    second_pass(scene, again, three);
-    REQUIRE(same(one.shadowbuffer, three.shadowbuffer));
-    REQUIRE(same(one.zbuffer, three.zbuffer) && same(one.faces, three.faces));
-    REQUIRE(same(one.framebuffer, three.framebuffer) && same(one.count, three.count));
+        if (!many) return;
+    }
+    REQUIRE(pictures[0] == pictures[1]);
 }
 
 }  // namespace

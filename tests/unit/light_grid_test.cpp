@@ -31,6 +31,10 @@ std::vector<vec3> surface(int n, Height&& z) {
     return corners;
 }
 
+Camera light_on(const std::vector<Model>& models, const vec3& direction, int size) {
+    return fitted({lookat(direction, {}, {0, 1, 0})}, models, size);
+}
+
 }  // namespace
 
 TEST("the fitted camera shows all of a model and no more") {
@@ -40,10 +44,10 @@ TEST("the fitted camera shows all of a model and no more") {
         const vec3 away = r.point(100);
         for (int i = 0; i < 30; i++) corners.push_back(r.point(3) + away);
         const std::vector<Model> models{model_of(corners)};
-        const Camera c = fitted_camera(models, r.point(1), {0, 1, 0}, 64);
+        const Camera c = light_on(models, r.point(1), 64);
         vec3 low{1e9, 1e9, 1e9}, high = -low;
         for (const vec3& v : corners) {
-            const vec3 p = project(c.object_to_screen() * point(v));
+            const vec3 p = project(c.to_screen() * point(v));
             for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
         }
         for (int i = 0; i < 3; i++) {
@@ -53,7 +57,7 @@ TEST("the fitted camera shows all of a model and no more") {
     }
     // A model without extent in a direction, and one that is a single point: no division by zero.
     for (const auto& corners : {surface(1, [](double, double) { return .25; }), std::vector<vec3>(3, vec3{1, 2, 3})}) {
-        const mat4 m = fitted_camera({model_of(corners)}, {0, 0, 1}, {0, 1, 0}, 64).object_to_screen();
+        const mat4 m = light_on({model_of(corners)}, {0, 0, 1}, 64).to_screen();
         for (const vec3& v : corners) CHECK(std::isfinite(norm((m * point(v)).xyz())));
     }
 }
@@ -69,7 +73,7 @@ TEST("the grid agrees with a look at every face") {
         }
         const std::vector<Model> models{model_of(corners)};
         const int cells = 1 + k * 5;
-        const Camera light = fitted_camera(models, r.point(1), {0, 1, 0}, cells);
+        const Camera light = light_on(models, r.point(1), cells);
         const LightGrid grid(models, light, cells);
         for (int i = 0; i < 4000; i++) {
             // A point on one of the faces; in long double: is any other face above it?
@@ -77,17 +81,17 @@ TEST("the grid agrees with a look at every face") {
             double u = r.in(0, 1), v = r.in(0, 1);
             if (u + v > 1) u = 1 - u, v = 1 - v;
             const auto on_screen = [&](int face, int c) {
-                return project(light.object_to_screen() * point(models[0].vert(face, c)));
+                return project(light.to_screen() * point(models[0].vert(face, c)));
             };
             const vec3 p = on_screen(own, 0) * (1 - u - v) + on_screen(own, 1) * u + on_screen(own, 2) * v;
             bool shadowed = false, close = false;
             for (int face = 0; face < 200; face++) {
                 if (face == own) continue;
                 const vec3 a = on_screen(face, 0) - p, b = on_screen(face, 1) - p, c = on_screen(face, 2) - p;
-                using real = long double;
-                const real x = real(b.x) * c.y - real(b.y) * c.x, y = real(c.x) * a.y - real(c.y) * a.x,
-                           z = real(a.x) * b.y - real(a.y) * b.x, area = x + y + z;
-                const real height = (x * a.z + y * b.z + z * c.z) / area, least = std::min({x / area, y / area, z / area});
+                using wide = long double;
+                const wide x = wide(b.x) * c.y - wide(b.y) * c.x, y = wide(c.x) * a.y - wide(c.y) * a.x,
+                           z = wide(a.x) * b.y - wide(a.y) * b.x, area = x + y + z;
+                const wide height = (x * a.z + y * b.z + z * c.z) / area, least = std::min({x / area, y / area, z / area});
                 shadowed |= least > 0 && height > 0;
                 close |= std::fabs(least) < 1e-9L || (least > 0 && std::fabs(height) < 1e-9L);
             }
@@ -105,13 +109,13 @@ TEST("no light falls through a seam, no flat surface shadows itself") {
         for (const vec3& v : surface(16, [&](double x, double y) { return tilt * (x + .3 * y) - 1 - tilt; })) corners.push_back(v);
         const std::vector<Model> models{model_of(corners)};
         const int cells = 20;
-        const Camera light = fitted_camera(models, {0, 0, 1}, {0, 1, 0}, cells);
+        const Camera light = light_on(models, {0, 0, 1}, cells);
         const LightGrid grid(models, light, cells);
         Random r(3);
         int lit = 0, dark = 0, expected = 0;
         for (std::size_t face = 0; face < corners.size() / 3; face++) {
             vec3 s[3];
-            for (int c = 0; c < 3; c++) s[c] = project(light.object_to_screen() * point(corners[face * 3 + static_cast<std::size_t>(c)]));
+            for (int c = 0; c < 3; c++) s[c] = project(light.to_screen() * point(corners[face * 3 + c]));
             for (int k = 0; k < 40; k++) {
                 const double t = k < 10 ? 0 : r.in(0, 1);  // corners, then points of the edges
                 const vec3 p = s[k % 3] * (1 - t) + s[(k + 1) % 3] * t;
@@ -131,14 +135,14 @@ TEST("a soup of large faces takes memory by the face, and is still right") {
     std::vector<vec3> corners;
     for (int i = 0; i < 2000 * 3; i++) corners.push_back(r.point(1));
     const std::vector<Model> models{model_of(corners)};
-    const Camera fine = fitted_camera(models, {0, 0, 1}, {0, 1, 0}, 512), coarse = fitted_camera(models, {0, 0, 1}, {0, 1, 0}, 1);
+    const Camera fine = light_on(models, {0, 0, 1}, 512), coarse = light_on(models, {0, 0, 1}, 1);
     const LightGrid grid(models, fine, 512), whole(models, coarse, 1);
     CHECK(grid.bytes() <= 600 * 2000);
     for (int i = 0; i < 2000; i++) {
         const int face = static_cast<int>(r.rng() % 2000);
         const auto at = [&](const Camera& c) {
             vec3 s;
-            for (int k = 0; k < 3; k++) s = s + project(c.object_to_screen() * point(models[0].vert(face, k))) / 3;
+            for (int k = 0; k < 3; k++) s = s + project(c.to_screen() * point(models[0].vert(face, k))) / 3;
             return s;
         };
         CHECK_EQ(grid.shadows(at(fine), face), whole.shadows(at(coarse), face));
