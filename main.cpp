@@ -14,8 +14,8 @@
 #include <vector>
 
 struct Options {  // the lesson's scene; the command line can change each of these
-    int width = 800, height = 800;  // of the picture, pixels
-    int shadow_size = 800;          // of the shadow buffer, a side
+    int width = 800, height = 800;  // of the picture, in pixels
+    int shadow_size = 800;          // of the shadow buffer, in pixels a side
     vec3 light_dir{1, 1, 0};        // towards the light
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     enum class Shadow { map, exact, off } shadow = Shadow::map;
@@ -29,47 +29,48 @@ struct Options {  // the lesson's scene; the command line can change each of the
 
 // ---- pass 1: what the light sees ----
 
-struct DepthShader final : IShader {  // only the z-buffer is wanted, so there is no fragment()
+struct DepthShader final : IShader {  // only the z-buffer is wanted: there is no fragment()
     const Model& model;
     mat4 uniform_M;  // Projection*ModelView
 
     DepthShader(const Model& m, const Camera& camera) : IShader(0, m.nfaces()), model(m), uniform_M(camera.to_clip()) {}
 
     vec4 vertex(int iface, int nthvert) override {
-        return uniform_M * point(model.vert(iface, nthvert));  // from object to clip space
+        return uniform_M * point(model.vert(iface, nthvert));  // read the vertex of the .obj, take it to clip space
     }
 };
 
-// What the first pass leaves for the second.
-struct Shadow {
-    mat4 M;                    // from object space to the light's screen
-    DepthBuffer shadowbuffer;  // what is nearest to the light ...
+struct Shadow {                // what the first pass leaves for the second
+    mat4 M;                    // Viewport*Projection*ModelView of the light: from object space to its screen
+    DepthBuffer shadowbuffer;  // what is nearest to the light there ...
     LightGrid grid;            // ... or, for exact shadows, all faces
 };
 
 // ---- pass 2: what the viewer sees ----
 
-// A fragment is a few neighbouring pixels of a face: a real is a number for each of them, a mask a yes or no for each. Phong's
-// reflection model with the lesson's weights, in eye coordinates. What a material has no map for is not computed.
+// Phong's reflection model with the lesson's weights, in eye coordinates. fragment() is called for a few neighbouring
+// pixels of a face at once: a real is a number for each of them, a mask a yes or no. What a material has no map for is
+// not computed.
 struct PhongShader final : IShader {
     const Options& opt;
+    const Shadow& shadow;
     const Model& model;
     const Material& material;
-    const Shadow& shadow;
     mat4 uniform_M;        // ModelView
     mat4 uniform_PM;       // Projection*ModelView
-    mat4 uniform_MIT;      // ModelView.invert_transpose(): it carries normals where uniform_M carries points
+    mat4 uniform_MIT;      // ModelView.invert_transpose(), carries normals where ModelView carries points
     mat4 uniform_Mshadow;  // from the viewer's screen to the shadow buffer's
-    vec3 uniform_l;        // towards the light, unit
-    vec2 varying_uv[3];    // texture coordinates
+    vec3 uniform_l;        // light vector: towards the light, of length 1
+    vec2 varying_uv[3];    // texture coordinates; this and the others written by vertex(), read by fragment()
     vec3 varying_nrm[3];   // normals of the vertices
-    vec3 varying_tri[3];   // the triangle
+    vec3 varying_tri[3];   // the triangle in eye coordinates
     vec3 varying_sb[3];    // the triangle in the shadow buffer
 
-    PhongShader(const Options& o, const Model& m, const Model::Group& group, const Camera& camera, const Shadow& s, const mat4& Mshadow)
-        : IShader(group.begin, group.end), opt(o), model(m), material(m.materials()[group.material]), shadow(s),
+    PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m, const Model::Group& group)
+        : IShader(group.begin, group.end), opt(o), shadow(s), model(m), material(m.materials()[group.material]),
           uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
-          uniform_MIT(invert_transpose(linear_part(uniform_M)).value()), uniform_Mshadow(Mshadow),
+          uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
+          uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
           uniform_l(normalized((uniform_M * direction(normalized(opt.light_dir))).xyz())) {}
 
     vec4 vertex(int iface, int nthvert) override {
@@ -86,34 +87,36 @@ struct PhongShader final : IShader {
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
-        const mask facing = diff > 0;  // what is turned away has no light to lose
+        const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow is looked up, nothing shines
         const mask lit = any(facing) ? in_light(f) : false;
-        if (opt.draw == Options::Draw::normal) return Color{n.z, n.y, n.x} * 127.5 + Color{128, 128, 128};
-        if (opt.draw == Options::Draw::shadow) return Color{1, 1, 1} * select(facing, select(lit, 255, 0), 128);
-
         real spec = 0;
         if (any(facing) && !material.specular.empty()) {
             const vec<3, real> r = n * (2 * dot(n, l)) - l;  // reflected light; the viewer is far off at +z
             spec = select(facing & (r.z > 0), power(r.z, Texels(material.specular, uv)[0]), 0);
         }
-        const real light = (1.2 * diff + .6 * spec) * (.3 + .7 * select(lit, 1, 0));
-        Color c{255, 255, 255}, glow{};
-        if (!material.diffuse.empty()) c = Texels(material.diffuse, uv).bgr();
-        if (!material.glow.empty()) glow = Texels(material.glow, uv).bgr();
-        for (int i = 0; i < 3; i++) c[i] = 20 + c[i] * material.Kd[2 - i] * light + glow[i];
+        const real shade = .3 + .7 * select(lit, 1, 0);
+        const Color texel = material.diffuse.empty() ? Color{255, 255, 255} : Texels(material.diffuse, uv).bgr();
+        const Color glow = material.glow.empty() ? Color{0, 0, 0} : Texels(material.glow, uv).bgr();
+        Color c;
+        for (int i = 0; i < 3; i++)
+            c[i] = 20 + texel[i] * material.Kd[2 - i] * ((1.2 * diff + .6 * spec) * shade) + glow[i];
+
+        // --draw: when something is wrong, these are the first two things to look at.
+        if (opt.draw == Options::Draw::shadow) c = Color{1, 1, 1} * select(facing, select(lit, 255, 0), 128);
+        if (opt.draw == Options::Draw::normal) c = Color{n.z, n.y, n.x} * 127.5 + Color{128, 128, 128};
         return c;
     }
 
-    // Does the light see them too?
     mask in_light(const Fragment& f) const {
         if (opt.shadow == Options::Shadow::off) return true;
-        if (opt.shadow == Options::Shadow::exact) return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
+        if (opt.shadow == Options::Shadow::exact)
+            return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
         const vec<3, real> sb_p = project(uniform_Mshadow * point(f.screen));  // corresponding point in the shadow buffer
         const real bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, varying_sb);
-        return !(shadow.shadowbuffer.at(sb_p) > sb_p.z + bias);  // beside the buffer there is no caster
+        return !(shadow.shadowbuffer.at(sb_p) > sb_p.z + bias);
     }
 
-    vec<3, real> normal(const vec<2, real>& uv, const vec<3, real>& bar) const {  // unit
+    vec<3, real> normal(const vec<2, real>& uv, const vec<3, real>& bar) const {  // of length 1
         if (!material.normal.empty())
             return normalized((uniform_MIT * direction(Texels(material.normal, uv).normal())).xyz());
         const vec<3, real> n = normalized(interpolated(varying_nrm, bar));
@@ -132,37 +135,38 @@ struct PhongShader final : IShader {
 
 // ---- the two passes ----
 
-// Rendering the shadow buffer. A directional light is an orthographic camera. It is fitted to the models, so that no texel
-// is wasted; a constant bias means the text's own camera, whose samples lie at the texels' corners.
+// Rendering the shadow buffer: the camera stands at the light. It is fitted to the models, so that no texel is wasted;
+// but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
 static Shadow first_pass(const Options& opt, const std::vector<Model>& models) {
     Shadow shadow;
+    if (opt.shadow == Options::Shadow::off) return shadow;
     const bool exact = opt.shadow == Options::Shadow::exact, classic = opt.bias && !exact;
     const int size = exact ? LightGrid::good_cells(models) : opt.shadow_size;
-    Camera light{lookat(opt.light_dir, {}, opt.up), projection(0), middle_viewport(size, size)};
+    Camera light{lookat(opt.light_dir, {0, 0, 0}, opt.up), projection(0), middle_viewport(size, size)};
     if (!classic) light = fitted(light, models, size);
-    shadow.M = light.to_screen();  // Viewport*Projection*ModelView
-    if (opt.shadow == Options::Shadow::off) return shadow;
+    shadow.M = light.to_screen();
     if (exact) {
         shadow.grid = LightGrid(models, light, size);
         return shadow;
     }
-    shadow.shadowbuffer = DepthBuffer(size, size);
+    if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;
     std::vector<DepthShader> shaders;
     for (const Model& model : models) shaders.emplace_back(model, light);
-    draw(shaders, classic ? translation({.5, .5, 0}) * light.Viewport : light.Viewport, shadow.shadowbuffer);
+    shadow.shadowbuffer = DepthBuffer(size, size);
+    draw(shaders, light.Viewport, shadow.shadowbuffer);
     return shadow;
 }
 
-// Rendering the frame buffer.
-static Counters second_pass(const Options& opt, const std::vector<Model>& models, const Shadow& shadow, TGAImage& framebuffer) {
+// Rendering the frame buffer: the camera stands at the viewer, and each fragment asks whether the light sees it too.
+static Counters second_pass(const Options& opt, const std::vector<Model>& models, const Shadow& shadow,
+                            TGAImage& frame) {
     const Camera viewer{lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
                         middle_viewport(opt.width, opt.height)};
-    const mat4 Mshadow = shadow.M * viewer.from_screen();  // M*(Viewport*Projection*ModelView).invert()
-    DepthBuffer zbuffer(opt.width, opt.height);
     std::vector<PhongShader> shaders;
     for (const Model& model : models)
-        for (const Model::Group& group : model.groups()) shaders.emplace_back(opt, model, group, viewer, shadow, Mshadow);
-    return draw(shaders, viewer.Viewport, zbuffer, &framebuffer);
+        for (const Model::Group& group : model.groups()) shaders.emplace_back(opt, shadow, viewer, model, group);
+    DepthBuffer zbuffer(opt.width, opt.height);
+    return draw(shaders, viewer.Viewport, zbuffer, &frame);
 }
 
 // ==== the program around the lesson: the command line and the files ====
@@ -175,7 +179,9 @@ struct UsageError : std::runtime_error {  // a wrong command line: status 2
 struct Value {
     std::string option, text;
 
-    [[noreturn]] void fail(const std::string& wanted) const { throw UsageError(option + ": \"" + text + "\" is not " + wanted); }
+    [[noreturn]] void fail(const std::string& wanted) const {
+        throw UsageError(option + ": \"" + text + "\" is not " + wanted);
+    }
     template <class... T>
     bool is(const char* format, T*... parts) const {  // as scanf has it, and nothing behind it
         char rest;
@@ -187,15 +193,16 @@ struct Value {
     void read(int& n, int most) const {
         if (!is("%5d", &n) || n < 1 || n > most) fail("1 to " + std::to_string(most));
     }
-    void read(vec3& v) const {
-        if (!is("%lf,%lf,%lf", &v.x, &v.y, &v.z) || !(norm(v) <= 1e307)) fail("three numbers X,Y,Z, a length of at most 1e307");
-    }
     void read_size(int& w, int& h) const {
-        if (!is("%5dx%5d", &w, &h) || w < 1 || w > max_size || h < 1 || h > max_size)
+        if (!is("%5dx%5d", &w, &h) || std::min(w, h) < 1 || std::max(w, h) > max_size)
             fail("WxH, each 1 to " + std::to_string(max_size));
     }
+    void read(vec3& v) const {
+        if (!is("%lf,%lf,%lf", &v.x, &v.y, &v.z) || !(norm(v) <= 1e307))
+            fail("three numbers X,Y,Z, a length of at most 1e307");
+    }
     template <class Enum>
-    void read(Enum& value, const std::vector<std::string>& names) const {
+    void read(Enum& value, const std::vector<std::string>& names) const {  // in the order of its values
         const auto found = std::find(names.begin(), names.end(), text);
         if (found == names.end()) fail(names[0] + ", " + names[1] + " or " + names[2]);
         value = static_cast<Enum>(found - names.begin());
@@ -209,22 +216,27 @@ struct Option {
 
 static const Option options[] = {
     {"-o", "DIR", "folder of the two pictures (.)", [](Options& o, const Value& v) { o.out = v.text; }},
-    {"--size", "WxH", "the picture's pixels (800x800)", [](Options& o, const Value& v) { v.read_size(o.width, o.height); }},
-    {"--shadow-size", "N", "the shadow buffer's pixels a side (800)", [](Options& o, const Value& v) { v.read(o.shadow_size, max_size); }},
+    {"--size", "WxH", "the picture's pixels (800x800)",
+     [](Options& o, const Value& v) { v.read_size(o.width, o.height); }},
+    {"--shadow-size", "N", "the shadow buffer's pixels a side (800)",
+     [](Options& o, const Value& v) { v.read(o.shadow_size, max_size); }},
     {"--eye", "X,Y,Z", "the viewer (1,1,4)", [](Options& o, const Value& v) { v.read(o.eye); }},
     {"--center", "X,Y,Z", "what the viewer looks at (0,0,0)", [](Options& o, const Value& v) { v.read(o.center); }},
     {"--up", "X,Y,Z", "what appears upwards (0,1,0)", [](Options& o, const Value& v) { v.read(o.up); }},
-    {"--light", "X,Y,Z", "direction towards the light (1,1,0)", [](Options& o, const Value& v) { v.read(o.light_dir); }},
+    {"--light", "X,Y,Z", "direction towards the light (1,1,0)",
+     [](Options& o, const Value& v) { v.read(o.light_dir); }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
      [](Options& o, const Value& v) { v.read(o.shadow, {"map", "exact", "off"}); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
      [](Options& o, const Value& v) { v.read(o.bias.emplace()); }},
     {"--draw", "WHAT", "color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)",
      [](Options& o, const Value& v) { v.read(o.draw, {"color", "shadow", "normal"}); }},
-    {"--tangent", "", "prefer a tangent-space normal map to an object-space one", [](Options& o, const Value&) { o.tangent = true; }},
+    {"--tangent", "", "prefer a tangent-space normal map to an object-space one",
+     [](Options& o, const Value&) { o.tangent = true; }},
     {"--no-fit", "", "keep a model's own coordinates (default: fit what is beyond [-1,1]^3 or too small to see)",
      [](Options& o, const Value&) { o.fit = false; }},
-    {"--threads", "N", "the pictures are the same at any number (all processors)", [](Options& o, const Value& v) { v.read(o.threads, 256); }},
+    {"--threads", "N", "the pictures are the same at any number (all processors)",
+     [](Options& o, const Value& v) { v.read(o.threads, 256); }},
     {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }},
     {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }},
     {"--version", "", "print the version", [](Options& o, const Value&) { o.version = true; }},
@@ -234,7 +246,8 @@ static Options parse(int argc, char** argv) {
     Options opt;
     for (int i = 1; i < argc && !opt.help && !opt.version; i++) {
         const std::string arg = argv[i];
-        const auto option = std::find_if(std::begin(options), std::end(options), [&](const Option& o) { return arg == o.name; });
+        const auto is_named = [&](const Option& o) { return arg == o.name; };
+        const auto option = std::find_if(std::begin(options), std::end(options), is_named);
         if (option == std::end(options)) {
             if (arg.size() > 1 && arg[0] == '-') throw UsageError("unknown option " + arg);
             opt.models.push_back(arg);
@@ -278,10 +291,10 @@ static std::vector<Model> load(const Options& opt) {
 }
 
 // Writes both pictures or, where one does not fit on the disk, none.
-static void write(const Options& opt, const Shadow& shadow, const TGAImage& framebuffer) {
+static void write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
     std::vector<TGAFile> files;
     if (shadow.shadowbuffer.width()) files.emplace_back(depth_picture(shadow.shadowbuffer), opt.out / "depth.tga");
-    files.emplace_back(framebuffer, opt.out / "framebuffer.tga");
+    files.emplace_back(frame, opt.out / "framebuffer.tga");
     for (TGAFile& file : files) file.commit();
 }
 
@@ -289,32 +302,35 @@ static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+static void run(Options opt) {
+    const double start = milliseconds();
+    const std::vector<Model> models = load(opt);
+    // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
+    opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
+    const double loaded = milliseconds();
+    const Shadow shadow = first_pass(opt, models);
+    const double first = milliseconds();
+    TGAImage frame(opt.width, opt.height, TGAImage::RGB);
+    const Counters c = second_pass(opt, models, shadow, frame);
+    const double second = milliseconds();
+    write(opt, shadow, frame);
+    const double written = milliseconds();
+    if (opt.quiet) return;
+    std::string left_out = missing_maps(models);
+    if (opt.shadow == Options::Shadow::off) left_out += left_out.empty() ? "shadow" : ",shadow";
+    std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
+                "shadow_bytes %zu outside %ld between_samples %ld hidden %ld left_out %s\n",
+                c.triangles, c.shaded, c.shaded, loaded - start, first - loaded, second - first, written - second,
+                shadow.shadowbuffer.bytes() + shadow.grid.bytes(), c.outside, c.between_samples, c.covered - c.shaded,
+                left_out.empty() ? "-" : left_out.c_str());
+}
+
 int main(int argc, char** argv) try {
-    Options opt = parse(argc, argv);
+    const Options opt = parse(argc, argv);
     use_threads(opt.threads);
     if (opt.help) print_help();
     else if (opt.version) std::puts("umbra " UMBRA_VERSION);
-    else {
-        const double start = milliseconds();
-        const std::vector<Model> models = load(opt);
-        // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
-        opt.eye = opt.eye - opt.center, opt.center = {};
-        const double loaded = milliseconds();
-        const Shadow shadow = first_pass(opt, models);
-        const double lit = milliseconds();
-        TGAImage framebuffer(opt.width, opt.height, TGAImage::RGB);
-        const Counters c = second_pass(opt, models, shadow, framebuffer);
-        const double shaded = milliseconds();
-        write(opt, shadow, framebuffer);
-        std::string left_out = missing_maps(models);
-        if (opt.shadow == Options::Shadow::off) left_out += left_out.empty() ? "shadow" : ",shadow";
-        if (!opt.quiet)
-            std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
-                        "shadow_bytes %zu outside %ld between_samples %ld hidden %ld left_out %s\n",
-                        c.triangles, c.shaded, c.shaded, loaded - start, lit - loaded, shaded - lit, milliseconds() - shaded,
-                        shadow.shadowbuffer.bytes() + shadow.grid.bytes(), c.outside, c.between_samples,
-                        c.covered - c.shaded, left_out.empty() ? "-" : left_out.c_str());
-    }
+    else run(opt);
     if (std::fflush(stdout) || std::ferror(stdout)) throw std::runtime_error("standard output: cannot write");
     return 0;
 } catch (const UsageError& e) {
