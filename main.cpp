@@ -87,7 +87,7 @@ struct PhongShader final : IShader {
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
-        const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow is looked up, nothing shines
+        const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow, no highlight
         const mask lit = any(facing) ? in_light(f) : false;
         real spec = 0;
         if (any(facing) && !material.specular.empty()) {
@@ -111,7 +111,7 @@ struct PhongShader final : IShader {
         if (opt.shadow == Options::Shadow::off) return true;
         if (opt.shadow == Options::Shadow::exact)
             return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
-        const vec<3, real> sb_p = project(uniform_Mshadow * point(f.screen));  // corresponding point in the shadow buffer
+        const vec<3, real> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
         const real bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, varying_sb);
         return !(shadow.shadowbuffer.at(sb_p) > sb_p.z + bias);
     }
@@ -266,8 +266,8 @@ static Options parse(int argc, char** argv) {
 
 static void print_help() {
     std::puts("usage: umbra [options] [model.obj ...]\n\n"
-              "Draws the models, lit and with hard shadows, into framebuffer.tga, and what the light sees into depth.tga.\n"
-              "Several models share one scene. Without a model: the idol.\n");
+              "Draws the models, lit and with hard shadows, into framebuffer.tga, and what the light sees into\n"
+              "depth.tga. Several models share one scene. Without a model: the idol.\n");
     for (const Option& o : options) std::printf("  %-18s %s\n", (std::string(o.name) + " " + o.takes).c_str(), o.help);
 }
 

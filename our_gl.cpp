@@ -400,6 +400,9 @@ Barycentric planes(Screen s, Coverage& c) {
 // the edge and belongs to it if the edge is a left one (it runs down, counter-clockwise) or a top one (it runs left), so
 // that of two triangles sharing an edge exactly one owns the pixel. Range: with max_size pixels and the guard band,
 // differences of coordinates are below 2^30.6, edge functions below 2^62.2.
+//
+// Along a row an edge function grows by the same step from pixel to pixel. How often the step goes into it is where it
+// changes its sign; from row to row that grows by a quotient and a remainder, as in Bresenham's lines.
 template <class Visit>
 void for_each_span_of_fan(const Coverage& c, const Point* corners, int k, int y_begin, int y_end, Visit&& visit) {
     using wide = std::int64_t;
@@ -408,23 +411,34 @@ void for_each_span_of_fan(const Coverage& c, const Point* corners, int k, int y_
     const wide area = (wide{b.x} - a.x) * (wide{d.y} - a.y) - (wide{b.y} - a.y) * (wide{d.x} - a.x);
     if (area == 0) return;
     const Point* const corner[3] = {&a, area < 0 ? &d : &b, area < 0 ? &b : &d};
-    wide row[3], step_x[3], step_y[3];
+    struct Edge {
+        wide step, divisor, times, rest, more_times, more_rest;
+    } edges[3];
     for (int i = 0; i < 3; i++) {
         const Point &p = *corner[i], &q = *corner[(i + 1) % 3];
         const wide dx = wide{q.x} - p.x, dy = wide{q.y} - p.y;
         const bool top_left = dy < 0 || (dy == 0 && dx < 0);
-        row[i] = dx * (y_begin * one + half - p.y) - dy * (c.xmin * one + half - p.x) - (top_left ? 0 : 1);
-        step_x[i] = -dy * one;
-        step_y[i] = dx * one;
+        const wide first = dx * (y_begin * one + half - p.y) - dy * (c.xmin * one + half - p.x) - (top_left ? 0 : 1);
+        Edge& e = edges[i];
+        e.step = -dy * one;
+        e.divisor = e.step ? std::abs(e.step) : 1;
+        const auto divide = [&e](wide n, wide& quotient, wide& remainder) {  // rounded down
+            quotient = n / e.divisor, remainder = n % e.divisor;
+            if (remainder < 0) quotient--, remainder += e.divisor;
+        };
+        divide(first, e.times, e.rest);
+        divide(dx * one, e.more_times, e.more_rest);
     }
     for (int y = y_begin; y < y_end; y++) {
-        wide e0 = row[0], e1 = row[1], e2 = row[2];
-        int x = c.xmin;
-        while (x <= c.xmax && (e0 | e1 | e2) < 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
-        const int first = x;
-        while (x <= c.xmax && (e0 | e1 | e2) >= 0) x++, e0 += step_x[0], e1 += step_x[1], e2 += step_x[2];
-        if (x > first) visit(y, first, x);
-        for (int i = 0; i < 3; i++) row[i] += step_y[i];
+        wide first = 0, last = c.xmax - c.xmin;
+        for (Edge& e : edges) {
+            if (e.step > 0) first = std::max(first, -e.times);
+            else if (e.step < 0) last = std::min(last, e.times);
+            else if (e.times < 0) last = -1;
+            e.times += e.more_times, e.rest += e.more_rest;
+            if (e.rest >= e.divisor) e.times++, e.rest -= e.divisor;
+        }
+        if (first <= last) visit(y, c.xmin + static_cast<int>(first), c.xmin + static_cast<int>(last) + 1);
     }
 }
 
