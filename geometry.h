@@ -18,36 +18,44 @@
 
 // ---- lanes: several numbers side by side, as a GPU has them ----
 //
-// A real is one number for each of a few pixels, a mask one truth value for each. What is written once is done for all of
-// them, in the processor's vector registers; each lane holds what the number alone would be, bit for bit, so the number
-// of lanes shows in no picture. A real is made of parts as large as a register.
+// What is written once with these types is done for a few pixels at once, in the processor's vector registers: a coord
+// says where something is, in doubles; a real says how bright it is, for which floats are enough; a mask is a yes or no.
+// Each lane holds what the number alone would be, bit for bit, so that the count of lanes shows in no picture.
 
-#if defined(__AVX__)
-constexpr int lanes = 8, register_bytes = 32;
+#if !defined(__GNUC__)  // neither gcc nor clang: no vectors that have operators, so one lane
+constexpr int lanes = 1;
+#elif defined(__AVX__)
+constexpr int lanes = 8;
+#define ONE_OF_TWO 0, 2, 4, 6, 8, 10, 12, 14
+#define EACH_TWICE_LOW 0, 0, 1, 1, 2, 2, 3, 3
+#define EACH_TWICE_HIGH 4, 4, 5, 5, 6, 6, 7, 7
+#define ALL_OF_BOTH 0, 1, 2, 3, 4, 5, 6, 7
 #else
-constexpr int lanes = 4, register_bytes = 16;
+constexpr int lanes = 4;
+#define ONE_OF_TWO 0, 2, 4, 6
+#define EACH_TWICE_LOW 0, 0, 1, 1
+#define EACH_TWICE_HIGH 2, 2, 3, 3
+#define ALL_OF_BOTH 0, 1, 2, 3
 #endif
 
-#if defined(__GNUC__)  // gcc and clang know operators of whole registers
-template <class T>
-struct part_of {
-    typedef T type __attribute__((vector_size(register_bytes)));
-};
+template <class T, int n>
+struct vector_of {
+#if defined(__GNUC__)
+    typedef T type __attribute__((vector_size(n * sizeof(T))));
 #else
-template <class T>
-struct part_of {
     typedef T type;
-};
 #endif
+};
 
+// Floats and 32-bit integers fill one register, doubles and 64-bit integers two.
 template <class T>
 struct pack {
-    using part = typename part_of<T>::type;
-    static constexpr int parts = lanes * static_cast<int>(sizeof(T)) / static_cast<int>(sizeof(part));
+    static constexpr int parts = lanes > 1 ? static_cast<int>(sizeof(T)) / 4 : 1;
+    using part = typename vector_of<T, lanes / parts>::type;
     part p[parts];
 
     pack() = default;
-    INLINED pack(T s) { for (part& each : p) each = s - part{}; }
+    INLINED pack(double s) { for (part& each : p) each = static_cast<T>(s) - part{}; }
     INLINED explicit pack(const T (&values)[lanes]) { std::memcpy(p, values, sizeof p); }
     INLINED void store(T (&values)[lanes]) const { std::memcpy(values, p, sizeof p); }
     INLINED T operator[](int i) const {
@@ -55,70 +63,112 @@ struct pack {
         store(values);
         return values[i];
     }
+
+#define LANEWISE(op)                                                       \
+    INLINED friend pack operator op(const pack& a, const pack& b) {        \
+        pack out;                                                          \
+        for (int i = 0; i < parts; i++) out.p[i] = a.p[i] op b.p[i];       \
+        return out;                                                        \
+    }
+    LANEWISE(+) LANEWISE(-) LANEWISE(*) LANEWISE(/)
+#undef LANEWISE
+    INLINED friend pack operator-(const pack& a) { return pack(-0.) - a; }
 };
 
-using real = pack<double>;
+using real = pack<float>;
+using coord = pack<double>;
 
 struct mask {
-    pack<std::int64_t> m;  // 0 is false
+    pack<std::int32_t>::part m;  // 0 is no
     mask() = default;
-    INLINED mask(bool b) : m(b ? -1 : 0) {}
-    INLINED bool operator[](int i) const { return m[i] != 0; }
+    INLINED mask(bool b) : m((b ? -1 : 0) - pack<std::int32_t>::part{}) {}
+    INLINED explicit mask(const pack<std::int32_t>& a) : m(a.p[0]) {}
+    INLINED explicit mask(const pack<std::int64_t>& a) {
+#if defined(__GNUC__)
+        using halves = pack<std::int32_t>::part;
+        m = __builtin_shufflevector((halves)a.p[0], (halves)a.p[1], ONE_OF_TWO);
+#else
+        m = a.p[0] != 0;
+#endif
+    }
+    INLINED bool operator[](int i) const {
+        std::int32_t values[lanes];
+        std::memcpy(values, &m, sizeof m);
+        return values[i] != 0;
+    }
+    INLINED friend mask operator!(const mask& a) { return mask(a.m == 0, 0); }
+    INLINED friend mask operator&(const mask& a, const mask& b) { return mask(a.m & b.m, 0); }
+    INLINED friend mask operator|(const mask& a, const mask& b) { return mask(a.m | b.m, 0); }
+
+private:
+    INLINED mask(const pack<std::int32_t>::part& a, int) : m(a) {}
 };
 
-#define UMBRA_LANEWISE(result, op, type, a, b)                                     \
-    INLINED result operator op(const type& a_, const type& b_) {                   \
-        result out;                                                                \
-        for (int i = 0; i < real::parts; i++) out.a[i] = a_.b[i] op b_.b[i];       \
-        return out;                                                                \
-    }
-UMBRA_LANEWISE(real, +, real, p, p)
-UMBRA_LANEWISE(real, -, real, p, p)
-UMBRA_LANEWISE(real, *, real, p, p)
-UMBRA_LANEWISE(real, /, real, p, p)
-UMBRA_LANEWISE(mask, <, real, m.p, p)
-UMBRA_LANEWISE(mask, >, real, m.p, p)
-UMBRA_LANEWISE(mask, ==, real, m.p, p)
-UMBRA_LANEWISE(mask, &, mask, m.p, m.p)
-UMBRA_LANEWISE(mask, |, mask, m.p, m.p)
-#undef UMBRA_LANEWISE
-INLINED real operator-(const real& a) { return real(-0.) - a; }
-INLINED mask operator!(const mask& a) {
-    mask out;
-    for (int i = 0; i < real::parts; i++) out.m.p[i] = a.m.p[i] == 0;
-    return out;
-}
-INLINED real& operator+=(real& a, const real& b) { return a = a + b; }
-INLINED real& operator*=(real& a, const real& b) { return a = a * b; }
-
-// a where the mask is true, b elsewhere.
-INLINED real select(const mask& m, const real& a, const real& b) {
-    real out;
-    for (int i = 0; i < real::parts; i++) out.p[i] = m.m.p[i] ? a.p[i] : b.p[i];
-    return out;
-}
-INLINED bool any(const mask& m) {
-    pack<std::int64_t>::part sum = m.m.p[0];
-    for (int i = 1; i < real::parts; i++) sum |= m.m.p[i];
-    std::int64_t lane[sizeof sum / 8], all = 0;
-    std::memcpy(lane, &sum, sizeof sum);
-    for (const std::int64_t each : lane) all |= each;
+INLINED bool any(const mask& a) {
+    std::int64_t values[lanes / 2 + lanes % 2] = {}, all = 0;
+    std::memcpy(values, &a.m, sizeof a.m);
+    for (const std::int64_t v : values) all |= v;
     return all != 0;
 }
-INLINED real min(const real& a, const real& b) { return select(b < a, b, a); }  // as std::min, also of a NaN
-INLINED real max(const real& a, const real& b) { return select(a < b, b, a); }
+
+#define COMPARING(T, integer, op)                                                    \
+    INLINED mask operator op(const pack<T>& a, const pack<T>& b) {                   \
+        pack<integer> out;                                                           \
+        for (int i = 0; i < pack<T>::parts; i++) out.p[i] = a.p[i] op b.p[i];        \
+        return mask(out);                                                            \
+    }
+COMPARING(float, std::int32_t, <) COMPARING(float, std::int32_t, >) COMPARING(float, std::int32_t, ==)
+COMPARING(double, std::int64_t, <) COMPARING(double, std::int64_t, >) COMPARING(double, std::int64_t, ==)
+#undef COMPARING
+
+// a where the mask says yes, b elsewhere.
+INLINED real select(const mask& m, const real& a, const real& b) {
+    real out;
+    out.p[0] = m.m ? a.p[0] : b.p[0];
+    return out;
+}
+template <class T>
+    requires std::is_same_v<T, coord>
+INLINED coord select(const mask& m, const T& a, const coord& b) {
+    coord out;
+#if defined(__GNUC__)
+    using wide = pack<std::int64_t>::part;
+    out.p[0] = (wide)__builtin_shufflevector(m.m, m.m, EACH_TWICE_LOW) ? a.p[0] : b.p[0];
+    out.p[1] = (wide)__builtin_shufflevector(m.m, m.m, EACH_TWICE_HIGH) ? a.p[1] : b.p[1];
+#else
+    out.p[0] = m.m ? a.p[0] : b.p[0];
+#endif
+    return out;
+}
+
+// The nearest floats.
+INLINED real to_real(const coord& a) {
+    real out;
+#if defined(__GNUC__)
+    using half = vector_of<float, lanes / 2>::type;
+    out.p[0] = __builtin_shufflevector(__builtin_convertvector(a.p[0], half), __builtin_convertvector(a.p[1], half),
+                                       ALL_OF_BOTH);
+#else
+    out.p[0] = static_cast<float>(a.p[0]);
+#endif
+    return out;
+}
 
 // f(number) in each lane.
-template <class F>
-INLINED real each(const real& a, F&& f) {
-    double values[lanes];
+template <class T, class F>
+INLINED pack<T> each(const pack<T>& a, F&& f) {
+    T values[lanes];
     a.store(values);
-    for (double& v : values) v = f(v);
-    return real(values);
+    for (T& v : values) v = f(v);
+    return pack<T>(values);
 }
-INLINED real sqrt(const real& a) { return each(a, [](double v) { return std::sqrt(v); }); }
-INLINED real floor(const real& a) { return each(a, [](double v) { return std::floor(v); }); }
-INLINED real abs(const real& a) { return each(a, [](double v) { return std::fabs(v); }); }
+INLINED real sqrt(const real& a) { return each(a, [](float v) { return std::sqrt(v); }); }
+INLINED coord floor(const coord& a) { return each(a, [](double v) { return std::floor(v); }); }
+INLINED coord abs(const coord& a) { return each(a, [](double v) { return std::fabs(v); }); }
+INLINED real min(const real& a, const real& b) { return select(b < a, b, a); }  // as std::min, also of a NaN
+INLINED real max(const real& a, const real& b) { return select(a < b, b, a); }
+INLINED coord min(const coord& a, const coord& b) { return select(b < a, b, a); }
+INLINED coord max(const coord& a, const coord& b) { return select(a < b, b, a); }
 
 // ---- vectors: any size and scalar; two, three and four components also have names ----
 
@@ -237,10 +287,10 @@ template <int n>
 INLINED vec<n, real> normalized(const vec<n, real>& v) {
     const real squared = dot(v, v);
     vec<n, real> unit = v / sqrt(squared);
-    if (any(!(squared > 1e-30) | !(squared < 1e30))) {
-        double lane[n][lanes];
+    if (any(!(squared > 1e-30) | !(squared < 1e30))) {  // rare: each lane by itself
+        float lane[n][lanes];
         for (int l = 0; l < lanes; l++) {
-            vec<n> one;
+            vec<n, float> one;
             for (int i = 0; i < n; i++) one[i] = v[i][l];
             one = normalized(one);
             for (int i = 0; i < n; i++) lane[i][l] = one[i];
@@ -248,6 +298,10 @@ INLINED vec<n, real> normalized(const vec<n, real>& v) {
         for (int i = 0; i < n; i++) unit[i] = real(lane[i]);
     }
     return unit;
+}
+template <int n>
+INLINED vec<n, real> to_real(const vec<n, coord>& v) {
+    return componentwise<n, real>([&](int i) { return to_real(v[i]); });
 }
 
 // Homogeneous coordinates. A point moves with a translation, a direction does not: they are embedded by two different

@@ -83,7 +83,7 @@ struct PhongShader final : IShader {
     }
 
     Color fragment(const Fragment& f) const override {
-        const vec<2, real> uv = interpolated(varying_uv, f.bar);
+        const vec<2, coord> uv = interpolated(varying_uv, f.bar);
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
@@ -111,15 +111,15 @@ struct PhongShader final : IShader {
         if (opt.shadow == Options::Shadow::off) return true;
         if (opt.shadow == Options::Shadow::exact)
             return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
-        const vec<3, real> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
-        const real bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, varying_sb);
+        const vec<3, coord> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
+        const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, varying_sb);
         return !(shadow.shadowbuffer.at(sb_p) > sb_p.z + bias);
     }
 
-    vec<3, real> normal(const vec<2, real>& uv, const vec<3, real>& bar) const {  // of length 1
+    vec<3, real> normal(const vec<2, coord>& uv, const vec<3, coord>& bar) const {  // of length 1
         if (!material.normal.empty())
             return normalized((uniform_MIT * direction(Texels(material.normal, uv).normal())).xyz());
-        const vec<3, real> n = normalized(interpolated(varying_nrm, bar));
+        const vec<3, real> n = normalized(to_real(interpolated(varying_nrm, bar)));
         if (material.tangent.empty()) return n;
         // Darboux frame (i, j, n): i is the direction across n in which u grows, j that in which v grows. A mirrored
         // texture turns one of them round, so they are found one by one. No frame where uv do not span a plane.

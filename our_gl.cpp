@@ -88,30 +88,6 @@ TGAImage depth_picture(const DepthBuffer& depths) {
     return picture;
 }
 
-// ---- shaders ----
-
-Texels::Texels(const TGAImage& map, const vec<2, real>& uv) {
-    const auto wrapped = [](const real& t, int size, int (&texel)[lanes]) {
-        const real f = t - floor(t);  // may round up to 1; no number where t is beyond the range of a double
-        for (int i = 0; i < lanes; i++) texel[i] = f[i] >= 0 ? std::min(static_cast<int>(f[i] * size), size - 1) : 0;
-    };
-    int x[lanes], y[lanes];
-    wrapped(uv.x, map.width(), x);
-    wrapped(uv.y, map.height(), y);
-    for (int i = 0; i < lanes; i++) at_[i] = map.pixel(x[i], y[i]);
-}
-
-real power(real base, const real& exponent) {
-    real result = 1, left = exponent;
-    while (any(left > 0.)) {
-        const real half = floor(left * .5);
-        result = select(left > half * 2, result * base, result);  // an odd exponent
-        base *= base;
-        left = half;
-    }
-    return result;
-}
-
 // ---- threads ----
 
 namespace {
@@ -552,20 +528,20 @@ void shade(const Face& face, const Pixel* pixels, int n, IShader& shader, const 
             const Pixel& p = pixels[std::min(first + i, n - 1)];
             xs[i] = p.x, ys[i] = p.y;
         }
-        const real x(xs), y(ys), dx = x - face.xmin, dy = y - face.ymin;
+        const coord x(xs), y(ys), dx = x - face.xmin, dy = y - face.ymin;
         Fragment f;
         f.face = face.number;
         f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
         // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
         for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
-        const real sum = f.bar.x + f.bar.y + f.bar.z;
+        const coord sum = f.bar.x + f.bar.y + f.bar.z;
         for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
         const Color color = shader.fragment(f);
-        for (int channel = 0; channel < 3; channel++) {
-            double value[lanes];
-            min(color[channel], 255.).store(value);
-            for (int i = 0; i < lanes && first + i < n; i++)
-                picture.pixel(pixels[first + i].x, pixels[first + i].y)[channel] = static_cast<std::uint8_t>(value[i]);
+        float bgr[3][lanes];
+        for (int i = 0; i < 3; i++) min(color[i], 255).store(bgr[i]);
+        for (int i = 0; i < lanes && first + i < n; i++) {
+            std::uint8_t* const pixel = picture.pixel(pixels[first + i].x, pixels[first + i].y);
+            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[k][i]);
         }
     }
 }
@@ -661,20 +637,20 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBu
 //   each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are lower, half.
 // And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most; coverage is snapped
 // by half a sub-pixel.
-real derived_bias(const DepthBuffer& shadowbuffer, const vec<3, real>& sb_p, const vec3 (&face)[3]) {
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const vec3 (&face)[3]) {
     constexpr double depth_rounding = 1. / (1 << 14);
     const vec3 n = cross(face[1] - face[0], face[2] - face[0]);
     const vec2 slope{-n.x / n.z, -n.y / n.z};  // of the face's depth, per texel along x and y
-    const vec<2, real> to_centre{floor(sb_p.x) + .5 - sb_p.x, floor(sb_p.y) + .5 - sb_p.y};
-    const real rounding = depth_rounding + (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
-    const real receiver = dot(slope, to_centre), stored = shadowbuffer.at(sb_p);
+    const vec<2, coord> to_centre{floor(sb_p.x) + .5 - sb_p.x, floor(sb_p.y) + .5 - sb_p.y};
+    const double rounding = depth_rounding + (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
+    const coord receiver = dot(slope, to_centre), stored = shadowbuffer.at(sb_p);
     if (!any(stored > sb_p.z + (receiver + rounding))) return receiver + rounding;
 
-    const auto depth = [&](double dx, double dy) { return shadowbuffer.at(vec<3, real>{sb_p.x + dx, sb_p.y + dy, sb_p.z}); };
-    const auto fall = [&](const real& a, const real& b) {
-        return min(abs(stored - a), abs(stored - b)) / select((a < stored) & (b < stored), 2., 1.);
+    const auto depth = [&](double dx, double dy) { return shadowbuffer.at(vec<3, coord>{sb_p.x + dx, sb_p.y + dy, sb_p.z}); };
+    const auto fall = [&](const coord& a, const coord& b) {
+        return min(abs(stored - a), abs(stored - b)) / select((a < stored) & (b < stored), coord(2), 1);
     };
-    const real caster = fall(depth(-1, 0), depth(1, 0)) + fall(depth(0, -1), depth(0, 1));
+    const coord caster = fall(depth(-1, 0), depth(1, 0)) + fall(depth(0, -1), depth(0, 1));
     return max(receiver, caster) + rounding;
 }
 
@@ -765,10 +741,10 @@ bool LightGrid::shadows(const vec3& on_screen, int number) const {
     return false;
 }
 
-mask LightGrid::shadows(const vec<3, real>& on_screen, int number) const {
-    double dark[lanes];
+mask LightGrid::shadows(const vec<3, coord>& on_screen, int number) const {
+    float dark[lanes];
     for (int i = 0; i < lanes; i++) dark[i] = shadows(vec3{on_screen.x[i], on_screen.y[i], on_screen.z[i]}, number);
-    return real(dark) > 0.;
+    return real(dark) > 0;
 }
 
 // Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are the

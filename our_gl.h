@@ -71,10 +71,12 @@ public:
     double at(double x, double y) const {
         return x >= 0 && y >= 0 && x < w_ && y < h_ ? row(static_cast<int>(y))[static_cast<int>(x)] : nothing;
     }
-    real at(const vec<3, real>& p) const {
-        double z[lanes];
-        for (int i = 0; i < lanes; i++) z[i] = at(p.x[i], p.y[i]);
-        return real(z);
+    coord at(const vec<3, coord>& p) const {
+        double x[lanes], y[lanes], z[lanes];
+        p.x.store(x);
+        p.y.store(y);
+        for (int i = 0; i < lanes; i++) z[i] = at(x[i], y[i]);
+        return coord(z);
     }
 
 private:
@@ -90,8 +92,8 @@ TGAImage depth_picture(const DepthBuffer& depths);
 // Some neighbouring pixels of one face, one in each lane: what the pipeline hands to IShader::fragment.
 struct Fragment {
     int face;              // its number among all faces of the pass
-    vec<3, real> screen;   // the pixel's centre and the depth there
-    vec<3, real> bar;      // barycentric coordinates on the face itself (perspective undone): each >= 0, their sum is 1
+    vec<3, coord> screen;  // the pixel's centre and the depth there
+    vec<3, coord> bar;     // barycentric coordinates on the face itself (perspective undone): each >= 0, their sum is 1
 };
 
 using Color = vec<3, real>;  // a TGAColor in each lane: blue, green, red from 0 up; what is above 255 is drawn as 255
@@ -112,8 +114,8 @@ protected:
 
 // A varying at a fragment: its values at the corners, weighted.
 template <int n>
-INLINED vec<n, real> interpolated(const vec<n> (&varying)[3], const vec<3, real>& bar) {
-    return componentwise<n, real>(
+INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coord>& bar) {
+    return componentwise<n, coord>(
         [&](int i) { return varying[0][i] * bar.x + varying[1][i] * bar.y + varying[2][i] * bar.z; });
 }
 
@@ -121,24 +123,46 @@ INLINED vec<n, real> interpolated(const vec<n> (&varying)[3], const vec<3, real>
 // of any size.
 class Texels {
 public:
-    Texels(const TGAImage& map, const vec<2, real>& uv);
+    INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
+        double u[lanes], v[lanes];
+        wrapped(uv.x).store(u);
+        wrapped(uv.y).store(v);
+        for (int i = 0; i < lanes; i++)
+            at_[i] = map.pixel(std::min(static_cast<int>(u[i] * map.width()), map.width() - 1),
+                               std::min(static_cast<int>(v[i] * map.height()), map.height() - 1));
+    }
     INLINED real operator[](int channel) const {
-        double value[lanes];
+        float value[lanes];
         for (int i = 0; i < lanes; i++) value[i] = at_[i][channel];
         return real(value);
     }
-    Color bgr() const { return {(*this)[0], (*this)[1], (*this)[2]}; }
-    vec<3, real> normal() const {  // (r,g,b) from [0,255] to [-1,1]
-        return {(*this)[2] * 2 / 255 - 1, (*this)[1] * 2 / 255 - 1, (*this)[0] * 2 / 255 - 1};
+    INLINED Color bgr() const { return {(*this)[0], (*this)[1], (*this)[2]}; }
+    INLINED vec<3, real> normal() const {  // (r,g,b) from [0,255] to [-1,1]
+        return {(*this)[2] * (2 / 255.) - 1, (*this)[1] * (2 / 255.) - 1, (*this)[0] * (2 / 255.) - 1};
     }
 
 private:
+    // To [0,1]: rounding may give 1 itself. 0 where t is beyond the range of a double.
+    INLINED static coord wrapped(const coord& t) {
+        const coord f = t - floor(t);
+        return select((f < 0) | !(f == f), coord(0), f);
+    }
     const std::uint8_t* at_[lanes];
 };
 
 // base^exponent for integers from 0 to 255, by repeated squaring: the same product in the same order everywhere, which a
 // library's pow does not promise.
-real power(real base, const real& exponent);
+INLINED real power(real base, const real& exponent) {
+    std::int32_t left[lanes], all = 0;
+    for (int i = 0; i < lanes; i++) all |= left[i] = static_cast<std::int32_t>(exponent[i]);
+    real result = 1;
+    for (; all; all >>= 1, base = base * base) {
+        std::int32_t odd[lanes];
+        for (int i = 0; i < lanes; i++) odd[i] = -(left[i] & 1), left[i] >>= 1;
+        result = select(mask(pack<std::int32_t>(odd)), result * base, result);
+    }
+    return result;
+}
 
 // ---- drawing ----
 
@@ -178,7 +202,7 @@ Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, DepthBuf
 
 // How far a texel of the shadow buffer may stand above a fragment without shadowing it, in units of depth: what the
 // slopes of receiver and caster explain. sb_p: the fragment on the light's screen; face: the corners of its face there.
-real derived_bias(const DepthBuffer& shadowbuffer, const vec<3, real>& sb_p, const vec3 (&face)[3]);
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const vec3 (&face)[3]);
 
 // The exact shadow: faces sorted into the cells of a grid on the light's screen, so that the few that may stand between a
 // point and the light are found at once. No resolution, no bias: whether one does is decided on the face itself.
@@ -193,7 +217,7 @@ public:
 
     // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
     bool shadows(const vec3& on_screen, int number) const;
-    mask shadows(const vec<3, real>& on_screen, int number) const;
+    mask shadows(const vec<3, coord>& on_screen, int number) const;
 
     std::size_t bytes() const;
 
