@@ -6,6 +6,7 @@
 #pragma once
 #include <cassert>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -56,8 +57,13 @@ struct pack {
 
     pack() = default;
     INLINED pack(double s) { for (part& each : p) each = static_cast<T>(s) - part{}; }
-    INLINED explicit pack(const T (&values)[lanes]) { std::memcpy(p, values, sizeof p); }
-    INLINED void store(T (&values)[lanes]) const { std::memcpy(values, p, sizeof p); }
+    INLINED explicit pack(const T (&values)[lanes]) { *this = load(values); }
+    INLINED static pack load(const T* from) {
+        pack out;
+        std::memcpy(out.p, from, sizeof out.p);
+        return out;
+    }
+    INLINED void store(T* to) const { std::memcpy(to, p, sizeof p); }
     INLINED T operator[](int i) const {
         T values[lanes];
         store(values);
@@ -121,15 +127,20 @@ COMPARING(float, std::int32_t, <) COMPARING(float, std::int32_t, >) COMPARING(fl
 COMPARING(double, std::int64_t, <) COMPARING(double, std::int64_t, >) COMPARING(double, std::int64_t, ==)
 #undef COMPARING
 
-// a where the mask says yes, b elsewhere.
+// a where the mask says yes, b elsewhere. Numbers alone are taken for reals.
 INLINED real select(const mask& m, const real& a, const real& b) {
     real out;
     out.p[0] = m.m ? a.p[0] : b.p[0];
     return out;
 }
 template <class T>
-    requires std::is_same_v<T, coord>
-INLINED coord select(const mask& m, const T& a, const coord& b) {
+    requires(sizeof(T) == 4)
+INLINED pack<T> select(const mask& m, const pack<T>& a, const pack<T>& b) {
+    pack<T> out;
+    out.p[0] = m.m ? a.p[0] : b.p[0];
+    return out;
+}
+INLINED coord select(const mask& m, const std::same_as<coord> auto& a, const coord& b) {
     coord out;
 #if defined(__GNUC__)
     using wide = pack<std::int64_t>::part;

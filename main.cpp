@@ -165,8 +165,7 @@ static Counters second_pass(const Options& opt, const std::vector<Model>& models
     std::vector<PhongShader> shaders;
     for (const Model& model : models)
         for (const Model::Group& group : model.groups()) shaders.emplace_back(opt, shadow, viewer, model, group);
-    DepthBuffer zbuffer(opt.width, opt.height);
-    return draw(shaders, viewer.Viewport, zbuffer, &frame);
+    return draw(shaders, viewer.Viewport, frame);
 }
 
 // ==== the program around the lesson: the command line and the files ====

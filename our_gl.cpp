@@ -67,10 +67,10 @@ Camera fitted(const Camera& camera, const std::vector<Model>& models, int size) 
 
 // ---- the z-buffer ----
 
-DepthBuffer::DepthBuffer(int width, int height) : w_(width), h_(height) {
+DepthBuffer::DepthBuffer(int width, int height) : w_(width), h_(height), stride_((width + lanes - 1) / lanes * lanes) {
     if (w_ < 1 || h_ < 1 || w_ > max_size || h_ > max_size)
         throw std::invalid_argument("a buffer has 1 to 16384 pixels a side");
-    cells_.assign(std::size_t{1} * w_ * h_, nothing);
+    cells_ = std::make_unique_for_overwrite<float[]>(std::size_t{1} * stride_ * h_);
 }
 
 TGAImage depth_picture(const DepthBuffer& depths) {
@@ -492,20 +492,33 @@ struct Block {
     }
 };
 
-// Draws a face into the rows of the strip from y_begin on; where it is nearest, nearest (if given) gets its mark. Returns
-// the number of samples.
-long triangle(const Face& face, const Point* corners, int y_begin, DepthBuffer& zbuffer, std::int32_t* nearest, int mark) {
+// The rows of the strip that a thread is drawing: for each pixel the depth and, where colours are wanted, the mark of the
+// face that is nearest there. A row is as long as a whole number of lanes.
+struct Strip {
+    int y_begin, stride;
+    float* depth;
+    std::int32_t* nearest;  // or null
+};
+
+// Draws a face into a strip. Returns the number of samples that it covers.
+long triangle(const Face& face, const Point* corners, const Strip& strip, int mark) {
+    double numbers[lanes];
+    for (int i = 0; i < lanes; i++) numbers[i] = i;
+    const coord lane(numbers);
+    const pack<std::int32_t> marks(mark);
     long covered = 0;
-    for_each_span(face, corners, y_begin, y_begin + strip_rows, [&](int y, int x_begin, int x_end) {
-        float* const depth = zbuffer.row(y);
-        std::int32_t* const row = nearest ? nearest + std::ptrdiff_t{zbuffer.width()} * (y - y_begin) : nullptr;
+    for_each_span(face, corners, strip.y_begin, strip.y_begin + strip_rows, [&](int y, int x_begin, int x_end) {
+        float* const depth = strip.depth + std::ptrdiff_t{strip.stride} * (y - strip.y_begin);
+        std::int32_t* const nearest = strip.nearest ? strip.nearest + (depth - strip.depth) : nullptr;
         const double z_row = face.zy * (y - face.ymin) + face.z0;
         covered += x_end - x_begin;
-        for (int x = x_begin; x < x_end; x++) {
-            const auto z = static_cast<float>(std::clamp(face.zx * (x - face.xmin) + z_row, face.zmin, face.zmax));
-            if (!(z > depth[x])) continue;
-            depth[x] = z;
-            if (row) row[x] = mark;
+        for (int x0 = x_begin / lanes * lanes; x0 < x_end; x0 += lanes) {
+            const coord x = lane + x0;
+            const real z = to_real(min(max(face.zx * (x - face.xmin) + z_row, face.zmin), face.zmax));
+            const real old = real::load(depth + x0);
+            const mask nearer = (z > old) & !(x < x_begin) & (x < x_end);
+            select(nearer, z, old).store(depth + x0);
+            if (nearest) select(nearer, marks, pack<std::int32_t>::load(nearest + x0)).store(nearest + x0);
         }
     });
     return covered;
@@ -550,59 +563,66 @@ using Shaders = std::function<IShader&(int i, int thread)>;
 
 // What a thread needs for a strip, kept from one to the next.
 struct Workspace {
-    std::vector<std::int32_t> nearest;  // of the strip's pixels: the mark of the face, -1 for none
-    std::vector<int> seen;              // pixels that show the face with this mark, summed up: where its list of pixels ends
+    std::vector<float> depth;
+    std::vector<std::int32_t> nearest;
+    std::vector<int> ends;  // for each face of the strip, where its list of pixels ends
     std::vector<Pixel> pixels;
     Counters count;
 };
 
-void draw_strip(const std::vector<Block>& blocks, int strip, int thread, const Shaders& shader, const mat4& Viewport,
-                DepthBuffer& zbuffer, TGAImage* picture, Workspace& w) {
-    const int y_begin = strip * strip_rows, rows = std::min(strip_rows, zbuffer.height() - y_begin), width = zbuffer.width();
-    if (picture) w.nearest.assign(std::size_t{1} * width * rows, -1);
+// What a pass draws into: depths, or colours.
+struct Target {
+    int width, height;
+    DepthBuffer* zbuffer;
+    TGAImage* picture;
+};
+
+void draw_strip(const std::vector<Block>& blocks, int number, int thread, const Shaders& shader, const mat4& Viewport,
+                const Target& target, Workspace& w) {
+    Strip strip{number * strip_rows, (target.width + lanes - 1) / lanes * lanes, nullptr, nullptr};
+    const int rows = std::min(strip_rows, target.height - strip.y_begin), cells = strip.stride * rows;
+    if (target.picture) {
+        w.depth.resize(cells);
+        w.nearest.assign(cells, -1);
+        strip.depth = w.depth.data(), strip.nearest = w.nearest.data();
+    } else {
+        strip.depth = target.zbuffer->row(strip.y_begin);
+    }
+    std::fill_n(strip.depth, cells, DepthBuffer::nothing);
     const auto for_each_face = [&](auto&& visit) {
         int mark = 0;
         for (const Block& b : blocks)
-            for (int i = b.first[strip]; i < b.first[strip + 1]; i++) visit(b, b.faces[b.touching[i]], mark++);
+            for (int i = b.first[number]; i < b.first[number + 1]; i++) visit(b, b.faces[b.touching[i]], mark++);
         return mark;
     };
     const int faces = for_each_face([&](const Block& b, const Face& face, int mark) {
-        w.count.covered += triangle(face, &b.corners[face.first], y_begin, zbuffer, picture ? w.nearest.data() : nullptr, mark);
+        w.count.covered += triangle(face, &b.corners[face.first], strip, mark);
     });
-    if (!picture) return;
+    if (!target.picture) return;
 
     // The pixels sorted by face: counted, summed up, filled in.
-    w.seen.assign(faces + 1, 0);
-    for (const std::int32_t mark : w.nearest) w.seen[mark + 1]++;
-    w.seen[0] = 0;
-    for (int i = 0; i < faces; i++) w.seen[i + 1] += w.seen[i];
-    w.pixels.resize(w.seen[faces]);
-    for (int y = 0; y < rows; y++)
-        for (int x = 0; x < width; x++)
-            if (const std::int32_t mark = w.nearest[std::size_t{1} * width * y + x]; mark >= 0)
-                w.pixels[w.seen[mark]++] = {x, y_begin + y};
+    w.ends.assign(faces + 1, 0);
+    for (const std::int32_t mark : w.nearest) w.ends[mark + 1]++;
+    w.ends[0] = 0;
+    for (int i = 0; i < faces; i++) w.ends[i + 1] += w.ends[i];
+    w.pixels.resize(w.ends[faces]);
+    for (int i = 0; i < cells; i++)
+        if (const std::int32_t mark = w.nearest[i]; mark >= 0)
+            w.pixels[w.ends[mark]++] = {i % strip.stride, strip.y_begin + i / strip.stride};
+    std::memset(target.picture->pixel(0, strip.y_begin), 0, std::size_t{1} * target.picture->bytespp() * target.width * rows);
     int done = 0;
     for_each_face([&](const Block&, const Face& face, int mark) {
-        const int n = w.seen[mark] - done;
-        if (n > 0) shade(face, &w.pixels[done], n, shader(face.shader, thread), Viewport, *picture);
+        const int n = w.ends[mark] - done;
+        if (n > 0) shade(face, &w.pixels[done], n, shader(face.shader, thread), Viewport, *target.picture);
         done += n;
     });
     w.count.shaded += done;
 }
 
-}  // namespace
-
-Counters& Counters::operator+=(const Counters& c) {
-    triangles += c.triangles, outside += c.outside, between_samples += c.between_samples;
-    covered += c.covered, shaded += c.shaded;
-    return *this;
-}
-
-Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer, TGAImage* picture) {
-    assert(!picture || (picture->width() == zbuffer.width() && picture->height() == zbuffer.height()));
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, const Target& target) {
     std::vector<int> first{0};  // the number of each shader's first face
     for (int i = 0; i < nshaders; i++) first.push_back(first[i] + shader(i, 0).end - shader(i, 0).begin);
-    const int faces = first.back(), strips = (zbuffer.height() + strip_rows - 1) / strip_rows;
+    const int faces = first.back(), strips = (target.height + strip_rows - 1) / strip_rows;
 
     // A thread gets several blocks, in case that some take longer than others, but none is worth fewer than some faces.
     constexpr int blocks_per_thread = 8, least_faces = 64;
@@ -613,18 +633,34 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBu
         for (auto number = static_cast<int>(faces * std::int64_t{b} / nblocks); number < faces * (b + std::int64_t{1}) / nblocks; number++) {
             while (number >= first[s + 1]) s++;
             IShader& own = shader(s, thread);
-            blocks[b].add(own, s, own.begin + number - first[s], number, Viewport, zbuffer.width(), zbuffer.height());
+            blocks[b].add(own, s, own.begin + number - first[s], number, Viewport, target.width, target.height);
         }
         blocks[b].sort_into_strips(strips);
     });
     std::vector<Workspace> spaces(thread_count());
     parallel_for(strips, [&](int strip, int thread) {
-        draw_strip(blocks, strip, thread, shader, Viewport, zbuffer, picture, spaces[thread]);
+        draw_strip(blocks, strip, thread, shader, Viewport, target, spaces[thread]);
     });
     Counters total;
     for (const Block& b : blocks) total += b.count;
     for (const Workspace& w : spaces) total += w.count;
     return total;
+}
+
+}  // namespace
+
+Counters& Counters::operator+=(const Counters& c) {
+    triangles += c.triangles, outside += c.outside, between_samples += c.between_samples;
+    covered += c.covered, shaded += c.shaded;
+    return *this;
+}
+
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer) {
+    return draw(shader, nshaders, Viewport, {zbuffer.width(), zbuffer.height(), &zbuffer, nullptr});
+}
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImage& picture) {
+    assert(picture.bytespp() >= 3);
+    return draw(shader, nshaders, Viewport, {picture.width(), picture.height(), nullptr, &picture});
 }
 
 // ---- shadows ----

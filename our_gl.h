@@ -11,6 +11,7 @@
 #include "tgaimage.h"
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 // ---- cameras ----
@@ -54,18 +55,19 @@ Camera fitted(const Camera& camera, const std::vector<Model>& models, int size);
 
 constexpr int max_size = 16384;  // pixels a side; the range of the integer edge functions rests on it
 
-// Depth on the screen, larger is nearer, minus infinity where nothing was drawn; rows from the bottom up.
+// Depth on the screen, larger is nearer, minus infinity where nothing was drawn: every cell, the first one too. Rows from
+// the bottom up.
 class DepthBuffer {
 public:
     static constexpr float nothing = -std::numeric_limits<float>::infinity();
 
     DepthBuffer() = default;
-    DepthBuffer(int width, int height);  // 1 to max_size a side, or std::invalid_argument
+    DepthBuffer(int width, int height);  // 1 to max_size a side, or std::invalid_argument; holds anything until draw()
     int width() const { return w_; }
     int height() const { return h_; }
-    std::size_t bytes() const { return cells_.size() * sizeof(float); }
-    float* row(int y) { return cells_.data() + std::ptrdiff_t{w_} * y; }
-    const float* row(int y) const { return cells_.data() + std::ptrdiff_t{w_} * y; }
+    std::size_t bytes() const { return std::size_t{1} * stride_ * h_ * sizeof(float); }
+    float* row(int y) { return cells_.get() + std::ptrdiff_t{stride_} * y; }
+    const float* row(int y) const { return cells_.get() + std::ptrdiff_t{stride_} * y; }
 
     // Of the pixel that the point (x,y) lies in; outside of the buffer there is nothing.
     double at(double x, double y) const {
@@ -80,8 +82,8 @@ public:
     }
 
 private:
-    int w_ = 0, h_ = 0;
-    std::vector<float> cells_;
+    int w_ = 0, h_ = 0, stride_ = 0;  // a row is as long as a whole number of lanes
+    std::unique_ptr<float[]> cells_;
 };
 
 // The depths as a grey picture: the nearest is white, the farthest a dark grey, and what was not drawn is black.
@@ -185,17 +187,17 @@ int thread_count();
 // thread_count(). In what order is not defined. What one of the calls throws is thrown here, once all have ended.
 void parallel_for(int n, const std::function<void(int i, int thread)>& work);
 
-// Draws the faces of all shaders into the z-buffer (the first drawn wins a tie) and then, where there is a picture, calls
-// fragment() for every pixel that is seen: once each, however many faces lie behind it. shader(i, thread) is the thread's
-// own copy of the i-th. The picture has three or four channels and the z-buffer's size.
-Counters draw(const std::function<IShader&(int i, int thread)>& shader, int nshaders, const mat4& Viewport,
-              DepthBuffer& zbuffer, TGAImage* picture);
+// A pass: draws the faces of all shaders. Into a z-buffer go the depths of what is nearest, whatever it held before (the
+// first drawn wins a tie). Into a picture of three or four channels go the colours: fragment() is called once for every
+// pixel that is seen, however many faces lie behind it, and the rest is black. shader(i, thread) is the thread's own copy
+// of the i-th.
+Counters draw(const std::function<IShader&(int i, int thread)>& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer);
+Counters draw(const std::function<IShader&(int i, int thread)>& shader, int nshaders, const mat4& Viewport, TGAImage& picture);
 
-template <class Shader>
-Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, DepthBuffer& zbuffer, TGAImage* picture = nullptr) {
+template <class Shader, class Target>
+Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& target) {
     std::vector<std::vector<Shader>> own(thread_count(), shaders);
-    return draw([&](int i, int thread) -> IShader& { return own[thread][i]; }, static_cast<int>(shaders.size()), Viewport,
-                zbuffer, picture);
+    return draw([&](int i, int thread) -> IShader& { return own[thread][i]; }, static_cast<int>(shaders.size()), Viewport, target);
 }
 
 // ---- shadows ----

@@ -36,7 +36,9 @@ struct Drawing {
 template <class Shader>
 Drawing drawing(const Shader& shader, int width, int height, const mat4& Viewport) {
     Drawing d{DepthBuffer(width, height), TGAImage(width, height, TGAImage::RGB), {}};
-    d.count = draw(std::vector<Shader>{shader}, Viewport, d.z, &d.picture);
+    const std::vector<Shader> shaders{shader};
+    draw(shaders, Viewport, d.z);
+    d.count = draw(shaders, Viewport, d.picture);
     return d;
 }
 inline Drawing drawing(const std::vector<vec4>& clip, int width, int height) {
