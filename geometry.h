@@ -88,7 +88,7 @@ struct mask {
     pack<std::int32_t>::part m;  // 0 is no
     mask() = default;
     INLINED mask(bool b) : m((b ? -1 : 0) - pack<std::int32_t>::part{}) {}
-    INLINED explicit mask(const pack<std::int32_t>& a) : m(a.p[0]) {}
+    INLINED explicit mask(const pack<std::int32_t>& a) : m(a.p[0] != 0) {}
     INLINED explicit mask(const pack<std::int64_t>& a) {
 #if defined(__GNUC__)
         using halves = pack<std::int32_t>::part;

@@ -536,9 +536,10 @@ void shade(const Face& face, const Pixel* pixels, int n, IShader& shader, const 
     to_screen(in_clip, Viewport, screen);
     const Barycentric b = planes(screen, c);
     for (int first = 0; first < n; first += lanes) {
+        const int count = std::min(lanes, n - first);
         double xs[lanes], ys[lanes];
         for (int i = 0; i < lanes; i++) {  // where pixels run out, the last one fills the lanes
-            const Pixel& p = pixels[std::min(first + i, n - 1)];
+            const Pixel& p = pixels[first + std::min(i, count - 1)];
             xs[i] = p.x, ys[i] = p.y;
         }
         const coord x(xs), y(ys), dx = x - face.xmin, dy = y - face.ymin;
@@ -550,11 +551,15 @@ void shade(const Face& face, const Pixel* pixels, int n, IShader& shader, const 
         const coord sum = f.bar.x + f.bar.y + f.bar.z;
         for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
         const Color color = shader.fragment(f);
-        float bgr[3][lanes];
-        for (int i = 0; i < 3; i++) min(color[i], 255).store(bgr[i]);
-        for (int i = 0; i < lanes && first + i < n; i++) {
+        std::uint32_t bgr[lanes];
+        float value[3][lanes];
+        for (int k = 0; k < 3; k++) min(color[k], 255).store(value[k]);
+        for (int i = 0; i < lanes; i++)
+            bgr[i] = static_cast<std::uint32_t>(static_cast<int>(value[0][i]) | static_cast<int>(value[1][i]) << 8 |
+                                                static_cast<int>(value[2][i]) << 16);
+        for (int i = 0; i < count; i++) {
             std::uint8_t* const pixel = picture.pixel(pixels[first + i].x, pixels[first + i].y);
-            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[k][i]);
+            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[i] >> 8 * k);
         }
     }
 }

@@ -73,11 +73,15 @@ public:
     double at(double x, double y) const {
         return x >= 0 && y >= 0 && x < w_ && y < h_ ? row(static_cast<int>(y))[static_cast<int>(x)] : nothing;
     }
-    coord at(const vec<3, coord>& p) const {
+    INLINED coord at(const vec<3, coord>& p) const {
         double x[lanes], y[lanes], z[lanes];
-        p.x.store(x);
-        p.y.store(y);
-        for (int i = 0; i < lanes; i++) z[i] = at(x[i], y[i]);
+        p.x.store(x), p.y.store(y);
+        int index[lanes];
+        for (int i = 0; i < lanes; i++) {
+            const bool inside = (x[i] >= 0) & (y[i] >= 0) & (x[i] < w_) & (y[i] < h_);
+            index[i] = inside ? static_cast<int>(y[i]) * stride_ + static_cast<int>(x[i]) : -1;
+        }
+        for (int i = 0; i < lanes; i++) z[i] = index[i] < 0 ? nothing : cells_[index[i]];
         return coord(z);
     }
 
@@ -127,15 +131,19 @@ class Texels {
 public:
     INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
         double u[lanes], v[lanes];
-        wrapped(uv.x).store(u);
-        wrapped(uv.y).store(v);
-        for (int i = 0; i < lanes; i++)
-            at_[i] = map.pixel(std::min(static_cast<int>(u[i] * map.width()), map.width() - 1),
-                               std::min(static_cast<int>(v[i] * map.height()), map.height() - 1));
+        wrapped(uv.x).store(u), wrapped(uv.y).store(v);
+        const int w = map.width(), h = map.height();
+        std::uint32_t index[lanes];
+        for (int i = 0; i < lanes; i++) {
+            const int x = static_cast<int>(u[i] * w), y = static_cast<int>(v[i] * h);
+            index[i] = static_cast<std::uint32_t>(y < h ? y : h - 1) * w + (x < w ? x : w - 1);
+        }
+        const std::uint8_t* const first = map.pixel(0, 0);
+        for (int i = 0; i < lanes; i++) std::memcpy(&bytes_[i], first + std::size_t{index[i]} * map.bytespp(), 4);
     }
     INLINED real operator[](int channel) const {
         float value[lanes];
-        for (int i = 0; i < lanes; i++) value[i] = at_[i][channel];
+        for (int i = 0; i < lanes; i++) value[i] = static_cast<float>(bytes_[i] >> 8 * channel & 255);
         return real(value);
     }
     INLINED Color bgr() const { return {(*this)[0], (*this)[1], (*this)[2]}; }
@@ -149,19 +157,21 @@ private:
         const coord f = t - floor(t);
         return select((f < 0) | !(f == f), coord(0), f);
     }
-    const std::uint8_t* at_[lanes];
+    std::uint32_t bytes_[lanes];  // four from the texel on, the first one lowest: a picture may be read three beyond its end
 };
 
 // base^exponent for integers from 0 to 255, by repeated squaring: the same product in the same order everywhere, which a
 // library's pow does not promise.
 INLINED real power(real base, const real& exponent) {
-    std::int32_t left[lanes], all = 0;
-    for (int i = 0; i < lanes; i++) all |= left[i] = static_cast<std::int32_t>(exponent[i]);
+    float e[lanes];
+    exponent.store(e);
+    std::int32_t left[lanes];
+    for (int i = 0; i < lanes; i++) left[i] = static_cast<std::int32_t>(e[i]);
     real result = 1;
-    for (; all; all >>= 1, base = base * base) {
-        std::int32_t odd[lanes];
-        for (int i = 0; i < lanes; i++) odd[i] = -(left[i] & 1), left[i] >>= 1;
-        result = select(mask(pack<std::int32_t>(odd)), result * base, result);
+    for (int bit = 1; bit < 256; bit *= 2, base = base * base) {
+        std::int32_t is_set[lanes];
+        for (int i = 0; i < lanes; i++) is_set[i] = left[i] & bit;
+        result = select(mask(pack<std::int32_t>(is_set)), result * base, result);
     }
     return result;
 }

@@ -345,7 +345,7 @@ TGAImage::TGAImage(int width, int height, Format format) : w_(width), h_(height)
     if (width < 1 || width > 65535 || height < 1 || height > 65535)
         throw std::invalid_argument("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
                                     " pixels: a side has 1 to 65535");
-    data_.resize(static_cast<std::size_t>(w_) * static_cast<std::size_t>(h_) * static_cast<std::size_t>(bpp_));
+    data_.resize(static_cast<std::size_t>(w_) * static_cast<std::size_t>(h_) * static_cast<std::size_t>(bpp_) + 3);
 }
 
 TGAImage TGAImage::read_tga_file(const fs::path& path) {
