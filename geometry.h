@@ -79,6 +79,16 @@ struct pack {
     LANEWISE(+) LANEWISE(-) LANEWISE(*) LANEWISE(/)
 #undef LANEWISE
     INLINED friend pack operator-(const pack& a) { return pack(-0.) - a; }
+    INLINED friend pack min(const pack& a, const pack& b) {  // as std::min, also of a NaN
+        pack out;
+        for (int i = 0; i < parts; i++) out.p[i] = b.p[i] < a.p[i] ? b.p[i] : a.p[i];
+        return out;
+    }
+    INLINED friend pack max(const pack& a, const pack& b) {
+        pack out;
+        for (int i = 0; i < parts; i++) out.p[i] = a.p[i] < b.p[i] ? b.p[i] : a.p[i];
+        return out;
+    }
 };
 
 using real = pack<float>;
@@ -176,10 +186,6 @@ INLINED pack<T> each(const pack<T>& a, F&& f) {
 INLINED real sqrt(const real& a) { return each(a, [](float v) { return std::sqrt(v); }); }
 INLINED coord floor(const coord& a) { return each(a, [](double v) { return std::floor(v); }); }
 INLINED coord abs(const coord& a) { return each(a, [](double v) { return std::fabs(v); }); }
-INLINED real min(const real& a, const real& b) { return select(b < a, b, a); }  // as std::min, also of a NaN
-INLINED real max(const real& a, const real& b) { return select(a < b, b, a); }
-INLINED coord min(const coord& a, const coord& b) { return select(b < a, b, a); }
-INLINED coord max(const coord& a, const coord& b) { return select(a < b, b, a); }
 
 // ---- vectors: any size and scalar; two, three and four components also have names ----
 

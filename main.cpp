@@ -24,7 +24,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     std::vector<std::filesystem::path> models;
     std::filesystem::path out = ".";
     bool tangent = false, fit = true, quiet = false, help = false, version = false;
-    int threads = thread_count();
+    int threads = thread_count(), frames = 1;
 };
 
 // ---- pass 1: what the light sees ----
@@ -76,9 +76,9 @@ struct PhongShader final : IShader {
     vec4 vertex(int iface, int nthvert) override {
         const vec3& v = model.vert(iface, nthvert);
         varying_uv[nthvert] = model.uv(iface, nthvert);
-        varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
-        varying_tri[nthvert] = (uniform_M * point(v)).xyz();
         varying_sb[nthvert] = project(shadow.M * point(v));
+        if (material.normal.empty()) varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
+        if (!material.tangent.empty()) varying_tri[nthvert] = (uniform_M * point(v)).xyz();
         return uniform_PM * point(v);
     }
 
@@ -137,9 +137,8 @@ struct PhongShader final : IShader {
 
 // Rendering the shadow buffer: the camera stands at the light. It is fitted to the models, so that no texel is wasted;
 // but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
-static Shadow first_pass(const Options& opt, const std::vector<Model>& models) {
-    Shadow shadow;
-    if (opt.shadow == Options::Shadow::off) return shadow;
+static void first_pass(const Options& opt, const std::vector<Model>& models, Shadow& shadow) {
+    if (opt.shadow == Options::Shadow::off) return;
     const bool exact = opt.shadow == Options::Shadow::exact, classic = opt.bias && !exact;
     const int size = exact ? LightGrid::good_cells(models) : opt.shadow_size;
     Camera light{lookat(opt.light_dir, {0, 0, 0}, opt.up), projection(0), middle_viewport(size, size)};
@@ -147,14 +146,13 @@ static Shadow first_pass(const Options& opt, const std::vector<Model>& models) {
     shadow.M = light.to_screen();
     if (exact) {
         shadow.grid = LightGrid(models, light, size);
-        return shadow;
+        return;
     }
     if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;
     std::vector<DepthShader> shaders;
     for (const Model& model : models) shaders.emplace_back(model, light);
-    shadow.shadowbuffer = DepthBuffer(size, size);
+    if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);
     draw(shaders, light.Viewport, shadow.shadowbuffer);
-    return shadow;
 }
 
 // Rendering the frame buffer: the camera stands at the viewer, and each fragment asks whether the light sees it too.
@@ -236,6 +234,8 @@ static const Option options[] = {
      [](Options& o, const Value&) { o.fit = false; }},
     {"--threads", "N", "the pictures are the same at any number (all processors)",
      [](Options& o, const Value& v) { v.read(o.threads, 256); }},
+    {"--frames", "N", "draw N times and tell the median time of each pass (1)",
+     [](Options& o, const Value& v) { v.read(o.frames, 9999); }},
     {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }},
     {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }},
     {"--version", "", "print the version", [](Options& o, const Value&) { o.version = true; }},
@@ -301,17 +301,29 @@ static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+static double median(std::vector<double>& values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+}
+
 static void run(Options opt) {
     const double start = milliseconds();
     const std::vector<Model> models = load(opt);
     // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
     const double loaded = milliseconds();
-    const Shadow shadow = first_pass(opt, models);
-    const double first = milliseconds();
+    Shadow shadow;
     TGAImage frame(opt.width, opt.height, TGAImage::RGB);
-    const Counters c = second_pass(opt, models, shadow, frame);
-    const double second = milliseconds();
+    Counters c;
+    std::vector<double> depth_ms, shade_ms;
+    for (int i = 0; i < opt.frames; i++) {
+        const double began = milliseconds();
+        first_pass(opt, models, shadow);
+        const double first = milliseconds();
+        c = second_pass(opt, models, shadow, frame);
+        depth_ms.push_back(first - began), shade_ms.push_back(milliseconds() - first);
+    }
+    const double drawn = milliseconds();
     write(opt, shadow, frame);
     const double written = milliseconds();
     if (opt.quiet) return;
@@ -319,7 +331,7 @@ static void run(Options opt) {
     if (opt.shadow == Options::Shadow::off) left_out += left_out.empty() ? "shadow" : ",shadow";
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
                 "shadow_bytes %zu outside %ld between_samples %ld hidden %ld left_out %s\n",
-                c.triangles, c.shaded, c.shaded, loaded - start, first - loaded, second - first, written - second,
+                c.triangles, c.shaded, c.shaded, loaded - start, median(depth_ms), median(shade_ms), written - drawn,
                 shadow.shadowbuffer.bytes() + shadow.grid.bytes(), c.outside, c.between_samples, c.covered - c.shaded,
                 left_out.empty() ? "-" : left_out.c_str());
 }

@@ -503,8 +503,10 @@ struct Strip {
 // Draws a face into a strip. Returns the number of samples that it covers.
 long triangle(const Face& face, const Point* corners, const Strip& strip, int mark) {
     double numbers[lanes];
-    for (int i = 0; i < lanes; i++) numbers[i] = i;
+    float same_numbers[lanes];
+    for (int i = 0; i < lanes; i++) numbers[i] = i, same_numbers[i] = static_cast<float>(i);
     const coord lane(numbers);
+    const real same_lane(same_numbers);
     const pack<std::int32_t> marks(mark);
     long covered = 0;
     for_each_span(face, corners, strip.y_begin, strip.y_begin + strip_rows, [&](int y, int x_begin, int x_end) {
@@ -513,8 +515,8 @@ long triangle(const Face& face, const Point* corners, const Strip& strip, int ma
         const double z_row = face.zy * (y - face.ymin) + face.z0;
         covered += x_end - x_begin;
         for (int x0 = x_begin / lanes * lanes; x0 < x_end; x0 += lanes) {
-            const coord x = lane + x0;
-            const real z = to_real(min(max(face.zx * (x - face.xmin) + z_row, face.zmin), face.zmax));
+            const coord dx = lane + (x0 - face.xmin);
+            const real z = to_real(min(max(face.zx * dx + z_row, face.zmin), face.zmax)), x = same_lane + x0;
             const real old = real::load(depth + x0);
             const mask nearer = (z > old) & !(x < x_begin) & (x < x_end);
             select(nearer, z, old).store(depth + x0);
@@ -524,44 +526,46 @@ long triangle(const Face& face, const Point* corners, const Strip& strip, int ma
     return covered;
 }
 
-struct Pixel {
-    std::int32_t x, y;
+// Pixels x to x + n - 1 of a row that show the same face, and the number of the next run of that face, -1 for none.
+struct Run {
+    int x, y, n, next;
 };
 
-// Colours n pixels of a face, as many at once as there are lanes.
-void shade(const Face& face, const Pixel* pixels, int n, IShader& shader, const mat4& Viewport, TGAImage& picture) {
+// Colours the runs of a face, as many pixels at once as there are lanes.
+void shade(const Face& face, const std::vector<Run>& runs, int first, IShader& shader, const mat4& Viewport, TGAImage& picture) {
     const vec4 in_clip[3] = {shader.vertex(face.iface, 0), shader.vertex(face.iface, 1), shader.vertex(face.iface, 2)};
     Screen screen;
     Coverage c = face;
     to_screen(in_clip, Viewport, screen);
     const Barycentric b = planes(screen, c);
-    for (int first = 0; first < n; first += lanes) {
-        const int count = std::min(lanes, n - first);
-        double xs[lanes], ys[lanes];
-        for (int i = 0; i < lanes; i++) {  // where pixels run out, the last one fills the lanes
-            const Pixel& p = pixels[first + std::min(i, count - 1)];
-            xs[i] = p.x, ys[i] = p.y;
-        }
+    Fragment f;
+    f.face = face.number;
+    double xs[lanes], ys[lanes];
+    int n = 0;
+    const auto flush = [&] {
+        for (int i = n; i < lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
         const coord x(xs), y(ys), dx = x - face.xmin, dy = y - face.ymin;
-        Fragment f;
-        f.face = face.number;
         f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
         // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
         for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
         const coord sum = f.bar.x + f.bar.y + f.bar.z;
         for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
         const Color color = shader.fragment(f);
-        std::uint32_t bgr[lanes];
         float value[3][lanes];
         for (int k = 0; k < 3; k++) min(color[k], 255).store(value[k]);
-        for (int i = 0; i < lanes; i++)
-            bgr[i] = static_cast<std::uint32_t>(static_cast<int>(value[0][i]) | static_cast<int>(value[1][i]) << 8 |
-                                                static_cast<int>(value[2][i]) << 16);
-        for (int i = 0; i < count; i++) {
-            std::uint8_t* const pixel = picture.pixel(pixels[first + i].x, pixels[first + i].y);
-            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[i] >> 8 * k);
+        for (int i = 0; i < n; i++) {
+            std::uint8_t* const pixel = picture.pixel(static_cast<int>(xs[i]), static_cast<int>(ys[i]));
+            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(value[k][i]);
+        }
+        n = 0;
+    };
+    for (int i = first; i >= 0; i = runs[i].next) {
+        for (int x = runs[i].x; x < runs[i].x + runs[i].n; x++) {
+            xs[n] = x, ys[n] = runs[i].y;
+            if (++n == lanes) flush();
         }
     }
+    if (n > 0) flush();
 }
 
 using Shaders = std::function<IShader&(int i, int thread)>;
@@ -570,8 +574,8 @@ using Shaders = std::function<IShader&(int i, int thread)>;
 struct Workspace {
     std::vector<float> depth;
     std::vector<std::int32_t> nearest;
-    std::vector<int> ends;  // for each face of the strip, where its list of pixels ends
-    std::vector<Pixel> pixels;
+    std::vector<Run> runs;
+    std::vector<int> first;  // for each face of the strip, the number of its first run
     Counters count;
 };
 
@@ -605,23 +609,25 @@ void draw_strip(const std::vector<Block>& blocks, int number, int thread, const 
     });
     if (!target.picture) return;
 
-    // The pixels sorted by face: counted, summed up, filled in.
-    w.ends.assign(faces + 1, 0);
-    for (const std::int32_t mark : w.nearest) w.ends[mark + 1]++;
-    w.ends[0] = 0;
-    for (int i = 0; i < faces; i++) w.ends[i + 1] += w.ends[i];
-    w.pixels.resize(w.ends[faces]);
-    for (int i = 0; i < cells; i++)
-        if (const std::int32_t mark = w.nearest[i]; mark >= 0)
-            w.pixels[w.ends[mark]++] = {i % strip.stride, strip.y_begin + i / strip.stride};
-    std::memset(target.picture->pixel(0, strip.y_begin), 0, std::size_t{1} * target.picture->bytespp() * target.width * rows);
-    int done = 0;
+    // What is seen of each face: a list of runs.
+    w.runs.clear();
+    w.first.assign(faces, -1);
+    for (int y = 0; y < rows; y++) {
+        const std::int32_t* const nearest = strip.nearest + std::ptrdiff_t{strip.stride} * y;
+        for (int x = 0, end; x < target.width; x = end) {
+            const std::int32_t mark = nearest[x];
+            for (end = x + 1; end < target.width && nearest[end] == mark;) end++;
+            if (mark < 0) continue;
+            w.runs.push_back({x, strip.y_begin + y, end - x, w.first[mark]});
+            w.first[mark] = static_cast<int>(w.runs.size()) - 1;
+            w.count.shaded += end - x;
+        }
+    }
+    TGAImage& picture = *target.picture;
+    std::memset(picture.pixel(0, strip.y_begin), 0, std::size_t{1} * picture.bytespp() * target.width * rows);
     for_each_face([&](const Block&, const Face& face, int mark) {
-        const int n = w.ends[mark] - done;
-        if (n > 0) shade(face, &w.pixels[done], n, shader(face.shader, thread), Viewport, *target.picture);
-        done += n;
+        if (w.first[mark] >= 0) shade(face, w.runs, w.first[mark], shader(face.shader, thread), Viewport, picture);
     });
-    w.count.shaded += done;
 }
 
 Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, const Target& target) {
