@@ -162,18 +162,42 @@ INLINED coord select(const mask& m, const std::same_as<coord> auto& a, const coo
     return out;
 }
 
-// The nearest floats.
-INLINED real to_real(const coord& a) {
-    real out;
+// In each lane what static_cast gives: the nearest float, the same number in double, or the integer towards zero.
 #if defined(__GNUC__)
-    using half = vector_of<float, lanes / 2>::type;
-    out.p[0] = __builtin_shufflevector(__builtin_convertvector(a.p[0], half), __builtin_convertvector(a.p[1], half),
-                                       ALL_OF_BOTH);
-#else
-    out.p[0] = static_cast<float>(a.p[0]);
-#endif
+template <class To>
+INLINED pack<To> narrowed(const coord& a) {
+    using half = typename vector_of<To, lanes / 2>::type;
+    const half low = __builtin_convertvector(a.p[0], half), high = __builtin_convertvector(a.p[1], half);
+    pack<To> out;
+    out.p[0] = __builtin_shufflevector(low, high, ALL_OF_BOTH);
     return out;
 }
+INLINED coord to_coord(const real& a) {
+    vector_of<float, lanes / 2>::type halves[2];
+    std::memcpy(halves, a.p, sizeof halves);
+    coord out;
+    for (int i = 0; i < 2; i++) out.p[i] = __builtin_convertvector(halves[i], coord::part);
+    return out;
+}
+INLINED pack<std::int32_t> to_int(const real& a) {
+    pack<std::int32_t> out;
+    out.p[0] = __builtin_convertvector(a.p[0], pack<std::int32_t>::part);
+    return out;
+}
+INLINED real to_real(const pack<std::int32_t>& a) {
+    real out;
+    out.p[0] = __builtin_convertvector(a.p[0], real::part);
+    return out;
+}
+#else
+template <class To>
+INLINED pack<To> narrowed(const coord& a) { return static_cast<To>(a.p[0]); }
+INLINED coord to_coord(const real& a) { return a.p[0]; }
+INLINED pack<std::int32_t> to_int(const real& a) { return static_cast<std::int32_t>(a.p[0]); }
+INLINED real to_real(const pack<std::int32_t>& a) { return static_cast<float>(a.p[0]); }
+#endif
+INLINED real to_real(const coord& a) { return narrowed<float>(a); }
+INLINED pack<std::int32_t> to_int(const coord& a) { return narrowed<std::int32_t>(a); }
 
 // f(number) in each lane.
 template <class T, class F>

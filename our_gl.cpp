@@ -541,6 +541,7 @@ void shade(const Face& face, const std::vector<Run>& runs, int first, IShader& s
     Fragment f;
     f.face = face.number;
     double xs[lanes], ys[lanes];
+    std::uint8_t* pixels[lanes];
     int n = 0;
     const auto flush = [&] {
         for (int i = n; i < lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
@@ -551,17 +552,16 @@ void shade(const Face& face, const std::vector<Run>& runs, int first, IShader& s
         const coord sum = f.bar.x + f.bar.y + f.bar.z;
         for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
         const Color color = shader.fragment(f);
-        float value[3][lanes];
-        for (int k = 0; k < 3; k++) min(color[k], 255).store(value[k]);
-        for (int i = 0; i < n; i++) {
-            std::uint8_t* const pixel = picture.pixel(static_cast<int>(xs[i]), static_cast<int>(ys[i]));
-            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(value[k][i]);
-        }
+        std::int32_t bgr[3][lanes];
+        for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
+        for (int i = 0; i < n; i++)
+            for (int k = 0; k < 3; k++) pixels[i][k] = static_cast<std::uint8_t>(bgr[k][i]);
         n = 0;
     };
     for (int i = first; i >= 0; i = runs[i].next) {
-        for (int x = runs[i].x; x < runs[i].x + runs[i].n; x++) {
-            xs[n] = x, ys[n] = runs[i].y;
+        std::uint8_t* pixel = picture.pixel(runs[i].x, runs[i].y);
+        for (int x = runs[i].x; x < runs[i].x + runs[i].n; x++, pixel += picture.bytespp()) {
+            xs[n] = x, ys[n] = runs[i].y, pixels[n] = pixel;
             if (++n == lanes) flush();
         }
     }

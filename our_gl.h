@@ -74,15 +74,13 @@ public:
         return x >= 0 && y >= 0 && x < w_ && y < h_ ? row(static_cast<int>(y))[static_cast<int>(x)] : nothing;
     }
     INLINED coord at(const vec<3, coord>& p) const {
-        double x[lanes], y[lanes], z[lanes];
-        p.x.store(x), p.y.store(y);
-        int index[lanes];
-        for (int i = 0; i < lanes; i++) {
-            const bool inside = (x[i] >= 0) & (y[i] >= 0) & (x[i] < w_) & (y[i] < h_);
-            index[i] = inside ? static_cast<int>(y[i]) * stride_ + static_cast<int>(x[i]) : -1;
-        }
-        for (int i = 0; i < lanes; i++) z[i] = index[i] < 0 ? nothing : cells_[index[i]];
-        return coord(z);
+        const mask inside = (!(p.x < 0)) & (!(p.y < 0)) & (p.x < w_) & (p.y < h_);
+        const pack<std::int32_t> y = to_int(select(inside, p.y, 0)), x = to_int(select(inside, p.x, 0));
+        std::int32_t index[lanes];
+        (y * stride_ + x).store(index);
+        float z[lanes];
+        for (int i = 0; i < lanes; i++) z[i] = cells_[index[i]];
+        return to_coord(select(inside, real(z), nothing));
     }
 
 private:
@@ -130,21 +128,20 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
 class Texels {
 public:
     INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
-        double u[lanes], v[lanes];
-        wrapped(uv.x).store(u), wrapped(uv.y).store(v);
         const int w = map.width(), h = map.height();
-        std::uint32_t index[lanes];
-        for (int i = 0; i < lanes; i++) {
-            const int x = static_cast<int>(u[i] * w), y = static_cast<int>(v[i] * h);
-            index[i] = static_cast<std::uint32_t>(y < h ? y : h - 1) * w + (x < w ? x : w - 1);
-        }
+        const pack<std::int32_t> x = min(to_int(fraction(uv.x) * w), w - 1), y = min(to_int(fraction(uv.y) * h), h - 1);
+        std::int32_t index[lanes];  // modulo 2^32: a picture may have more than 2^31 pixels
+        (y * w + x).store(index);
         const std::uint8_t* const first = map.pixel(0, 0);
-        for (int i = 0; i < lanes; i++) std::memcpy(&bytes_[i], first + std::size_t{index[i]} * map.bytespp(), 4);
+        std::int32_t bytes[lanes];
+        for (int i = 0; i < lanes; i++)
+            std::memcpy(&bytes[i], first + std::size_t{static_cast<std::uint32_t>(index[i])} * map.bytespp(), 4);
+        bytes_ = pack<std::int32_t>(bytes);
     }
     INLINED real operator[](int channel) const {
-        float value[lanes];
-        for (int i = 0; i < lanes; i++) value[i] = static_cast<float>(bytes_[i] >> 8 * channel & 255);
-        return real(value);
+        pack<std::int32_t> value;
+        value.p[0] = bytes_.p[0] >> 8 * channel & 255;
+        return to_real(value);
     }
     INLINED Color bgr() const { return {(*this)[0], (*this)[1], (*this)[2]}; }
     INLINED vec<3, real> normal() const {  // (r,g,b) from [0,255] to [-1,1]
@@ -152,26 +149,23 @@ public:
     }
 
 private:
-    // To [0,1]: rounding may give 1 itself. 0 where t is beyond the range of a double.
-    INLINED static coord wrapped(const coord& t) {
+    // Of t, in [0,1]: rounding may give 1 itself. 0 where t is beyond the range of a double.
+    INLINED static coord fraction(const coord& t) {
         const coord f = t - floor(t);
         return select((f < 0) | !(f == f), coord(0), f);
     }
-    std::uint32_t bytes_[lanes];  // four from the texel on, the first one lowest: a picture may be read three beyond its end
+    pack<std::int32_t> bytes_;  // four from the texel on, the first one lowest: up to three may lie beyond the picture
 };
 
 // base^exponent for integers from 0 to 255, by repeated squaring: the same product in the same order everywhere, which a
 // library's pow does not promise.
 INLINED real power(real base, const real& exponent) {
-    float e[lanes];
-    exponent.store(e);
-    std::int32_t left[lanes];
-    for (int i = 0; i < lanes; i++) left[i] = static_cast<std::int32_t>(e[i]);
+    const pack<std::int32_t> e = to_int(exponent);
     real result = 1;
     for (int bit = 1; bit < 256; bit *= 2, base = base * base) {
-        std::int32_t is_set[lanes];
-        for (int i = 0; i < lanes; i++) is_set[i] = left[i] & bit;
-        result = select(mask(pack<std::int32_t>(is_set)), result * base, result);
+        pack<std::int32_t> is_set;
+        is_set.p[0] = e.p[0] & bit;
+        result = select(mask(is_set), result * base, result);
     }
     return result;
 }
