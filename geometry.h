@@ -134,6 +134,7 @@ INLINED bool any(const mask& a) {
         return mask(out);                                                            \
     }
 COMPARING(float, std::int32_t, <) COMPARING(float, std::int32_t, >) COMPARING(float, std::int32_t, ==)
+COMPARING(std::int32_t, std::int32_t, <) COMPARING(std::int32_t, std::int32_t, >)
 COMPARING(double, std::int64_t, <) COMPARING(double, std::int64_t, >) COMPARING(double, std::int64_t, ==)
 #undef COMPARING
 
@@ -172,8 +173,10 @@ INLINED pack<To> narrowed(const coord& a) {
     out.p[0] = __builtin_shufflevector(low, high, ALL_OF_BOTH);
     return out;
 }
-INLINED coord to_coord(const real& a) {
-    vector_of<float, lanes / 2>::type halves[2];
+template <class T>
+    requires(sizeof(T) == 4)
+INLINED coord to_coord(const pack<T>& a) {
+    typename vector_of<T, lanes / 2>::type halves[2];
     std::memcpy(halves, a.p, sizeof halves);
     coord out;
     for (int i = 0; i < 2; i++) out.p[i] = __builtin_convertvector(halves[i], coord::part);
@@ -192,7 +195,8 @@ INLINED real to_real(const pack<std::int32_t>& a) {
 #else
 template <class To>
 INLINED pack<To> narrowed(const coord& a) { return static_cast<To>(a.p[0]); }
-INLINED coord to_coord(const real& a) { return a.p[0]; }
+template <class T>
+INLINED coord to_coord(const pack<T>& a) { return a.p[0]; }
 INLINED pack<std::int32_t> to_int(const real& a) { return static_cast<std::int32_t>(a.p[0]); }
 INLINED real to_real(const pack<std::int32_t>& a) { return static_cast<float>(a.p[0]); }
 #endif

@@ -84,6 +84,7 @@ struct PhongShader final : IShader {
 
     Color fragment(const Fragment& f) const override {
         const vec<2, coord> uv = interpolated(varying_uv, f.bar);
+        const Color texel = material.diffuse.empty() ? Color{255, 255, 255} : Texels(material.diffuse, uv).bgr();
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
@@ -95,7 +96,6 @@ struct PhongShader final : IShader {
             spec = select(facing & (r.z > 0), power(r.z, Texels(material.specular, uv)[0]), 0);
         }
         const real shade = .3 + .7 * select(lit, 1, 0);
-        const Color texel = material.diffuse.empty() ? Color{255, 255, 255} : Texels(material.diffuse, uv).bgr();
         const Color glow = material.glow.empty() ? Color{0, 0, 0} : Texels(material.glow, uv).bgr();
         Color c;
         for (int i = 0; i < 3; i++)
@@ -112,8 +112,9 @@ struct PhongShader final : IShader {
         if (opt.shadow == Options::Shadow::exact)
             return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
         const vec<3, coord> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
-        const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, varying_sb);
-        return !(shadow.shadowbuffer.at(sb_p) > sb_p.z + bias);
+        const coord stored = shadow.shadowbuffer.at(sb_p);
+        const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, varying_sb);
+        return !(stored > sb_p.z + bias);
     }
 
     vec<3, real> normal(const vec<2, coord>& uv, const vec<3, coord>& bar) const {  // of length 1

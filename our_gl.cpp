@@ -502,23 +502,20 @@ struct Strip {
 
 // Draws a face into a strip. Returns the number of samples that it covers.
 long triangle(const Face& face, const Point* corners, const Strip& strip, int mark) {
-    double numbers[lanes];
-    float same_numbers[lanes];
-    for (int i = 0; i < lanes; i++) numbers[i] = i, same_numbers[i] = static_cast<float>(i);
-    const coord lane(numbers);
-    const real same_lane(same_numbers);
-    const pack<std::int32_t> marks(mark);
+    std::int32_t numbers[lanes];
+    for (int i = 0; i < lanes; i++) numbers[i] = i;
+    const pack<std::int32_t> lane(numbers), marks(mark);
+    const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
     long covered = 0;
     for_each_span(face, corners, strip.y_begin, strip.y_begin + strip_rows, [&](int y, int x_begin, int x_end) {
         float* const depth = strip.depth + std::ptrdiff_t{strip.stride} * (y - strip.y_begin);
         std::int32_t* const nearest = strip.nearest ? strip.nearest + (depth - strip.depth) : nullptr;
-        const double z_row = face.zy * (y - face.ymin) + face.z0;
+        const coord z_row = face.zy * (y - face.ymin) + face.z0;
         covered += x_end - x_begin;
         for (int x0 = x_begin / lanes * lanes; x0 < x_end; x0 += lanes) {
-            const coord dx = lane + (x0 - face.xmin);
-            const real z = to_real(min(max(face.zx * dx + z_row, face.zmin), face.zmax)), x = same_lane + x0;
+            const real z = to_real(min(max(zx * to_coord(lane + (x0 - face.xmin)) + z_row, zmin), zmax));
             const real old = real::load(depth + x0);
-            const mask nearer = (z > old) & !(x < x_begin) & (x < x_end);
+            const mask nearer = (z > old) & (lane > x_begin - x0 - 1) & (lane < x_end - x0);
             select(nearer, z, old).store(depth + x0);
             if (nearest) select(nearer, marks, pack<std::int32_t>::load(nearest + x0)).store(nearest + x0);
         }
@@ -540,29 +537,33 @@ void shade(const Face& face, const std::vector<Run>& runs, int first, IShader& s
     const Barycentric b = planes(screen, c);
     Fragment f;
     f.face = face.number;
-    double xs[lanes], ys[lanes];
-    std::uint8_t* pixels[lanes];
+    constexpr int most = 32 * lanes;  // pixels that are collected before they are coloured
+    std::int32_t xs[most], ys[most];
     int n = 0;
     const auto flush = [&] {
-        for (int i = n; i < lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
-        const coord x(xs), y(ys), dx = x - face.xmin, dy = y - face.ymin;
-        f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
-        // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
-        for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
-        const coord sum = f.bar.x + f.bar.y + f.bar.z;
-        for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
-        const Color color = shader.fragment(f);
-        std::int32_t bgr[3][lanes];
-        for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
-        for (int i = 0; i < n; i++)
-            for (int k = 0; k < 3; k++) pixels[i][k] = static_cast<std::uint8_t>(bgr[k][i]);
+        for (int i = n; i % lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
+        for (int from = 0; from < n; from += lanes) {
+            const coord x = to_coord(pack<std::int32_t>::load(xs + from)), y = to_coord(pack<std::int32_t>::load(ys + from));
+            const coord dx = x - face.xmin, dy = y - face.ymin;
+            f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
+            // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
+            for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
+            const coord sum = f.bar.x + f.bar.y + f.bar.z;
+            for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
+            const Color color = shader.fragment(f);
+            std::int32_t bgr[3][lanes];
+            for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
+            for (int i = 0; i < lanes && from + i < n; i++) {
+                std::uint8_t* const pixel = picture.pixel(xs[from + i], ys[from + i]);
+                for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[k][i]);
+            }
+        }
         n = 0;
     };
     for (int i = first; i >= 0; i = runs[i].next) {
-        std::uint8_t* pixel = picture.pixel(runs[i].x, runs[i].y);
-        for (int x = runs[i].x; x < runs[i].x + runs[i].n; x++, pixel += picture.bytespp()) {
-            xs[n] = x, ys[n] = runs[i].y, pixels[n] = pixel;
-            if (++n == lanes) flush();
+        for (int x = runs[i].x; x < runs[i].x + runs[i].n; x++) {
+            xs[n] = x, ys[n] = runs[i].y;
+            if (++n == most) flush();
         }
     }
     if (n > 0) flush();
@@ -684,13 +685,13 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImag
 //   each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are lower, half.
 // And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most; coverage is snapped
 // by half a sub-pixel.
-coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const vec3 (&face)[3]) {
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored, const vec3 (&face)[3]) {
     constexpr double depth_rounding = 1. / (1 << 14);
     const vec3 n = cross(face[1] - face[0], face[2] - face[0]);
     const vec2 slope{-n.x / n.z, -n.y / n.z};  // of the face's depth, per texel along x and y
     const vec<2, coord> to_centre{floor(sb_p.x) + .5 - sb_p.x, floor(sb_p.y) + .5 - sb_p.y};
     const double rounding = depth_rounding + (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
-    const coord receiver = dot(slope, to_centre), stored = shadowbuffer.at(sb_p);
+    const coord receiver = dot(slope, to_centre);
     if (!any(stored > sb_p.z + (receiver + rounding))) return receiver + rounding;
 
     const auto depth = [&](double dx, double dy) { return shadowbuffer.at(vec<3, coord>{sb_p.x + dx, sb_p.y + dy, sb_p.z}); };

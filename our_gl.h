@@ -207,8 +207,10 @@ Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& 
 // ---- shadows ----
 
 // How far a texel of the shadow buffer may stand above a fragment without shadowing it, in units of depth: what the
-// slopes of receiver and caster explain. sb_p: the fragment on the light's screen; face: the corners of its face there.
-coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const vec3 (&face)[3]);
+// slopes of receiver and caster explain. sb_p: the fragment on the light's screen; stored: what the buffer holds there;
+// face: the corners of the fragment's face, on the light's screen too.
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored,
+                   const vec3 (&face)[3]);
 
 // The exact shadow: faces sorted into the cells of a grid on the light's screen, so that the few that may stand between a
 // point and the light are found at once. No resolution, no bias: whether one does is decided on the face itself.
