@@ -215,39 +215,23 @@ bool is_outside(const Screen& s, int width, int height) {
            all([=](const vec4& p) { return !(p.y < height * p.w); });
 }
 
-// The clipping planes: near, and the four sides of the guard band.
-struct Planes {
-    double near, right, top;
-    static constexpr int count = 5;
-    double distance(int plane, const vec4& s) const {  // homogeneous; inside where >= 0
-        switch (plane) {
-            case 0: return s.w - near;
-            case 1: return s.x + guard * s.w;
-            case 2: return right * s.w - s.x;
-            case 3: return s.y + guard * s.w;
-            default: return top * s.w - s.y;
-        }
-    }
+// A clipping plane, x, y or w = bound w (or near, for w): what is inside has a distance of at least 0.
+struct Plane {
+    int axis;
+    double side, bound;
+    double distance(const vec4& s) const { return axis == 3 ? s.w - bound : side * (s[axis] - bound * s.w); }
     // What a sum of large numbers lost of a distance that is zero: the end of an edge that is 1e20 pixels long would be
     // thousands of pixels off its plane.
-    void put_on(int plane, vec4& s) const {
-        switch (plane) {
-            case 0: s.w = near; break;
-            case 1: s.x = -guard * s.w; break;
-            case 2: s.x = right * s.w; break;
-            case 3: s.y = -guard * s.w; break;
-            default: s.y = top * s.w;
-        }
-    }
+    void pull(vec4& s) const { s[axis] = axis == 3 ? bound : bound * s.w; }
 };
 
 // Sutherland and Hodgman, one plane. A cut edge gets the same new corner from both of its faces, bit for bit: it is always
 // computed from the inner towards the outer end.
-int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* out) {
+int clip_polygon(const Plane& plane, const vec4* in, int n, vec4* out) {
     int m = 0;
     for (int i = 0; i < n; i++) {
         const vec4 &a = in[i], &b = in[(i + 1) % n];
-        const double da = planes.distance(plane, a), db = planes.distance(plane, b);
+        const double da = plane.distance(a), db = plane.distance(b);
         if (da >= 0) out[m++] = a;
         if ((da >= 0) != (db >= 0)) {
             const bool a_inside = da >= 0;
@@ -256,7 +240,7 @@ int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* o
             // A mean with positive weights: p + (q - p) t would lose a q that is some 2^53 times smaller than p.
             const double length = d_in - d_out;
             out[m] = p * (-d_out / length) + q * (d_in / length);
-            planes.put_on(plane, out[m++]);
+            plane.pull(out[m++]);
         }
     }
     return m;
@@ -264,14 +248,14 @@ int clip_polygon(const Planes& planes, int plane, const vec4* in, int n, vec4* o
 
 // Cuts the face to what is in front of the eye and inside the guard band; returns the number of corners, 0 for nothing.
 int clip(const Screen& s, int width, int height, vec4 (&polygon)[most_corners]) {
-    const Planes planes{s.near, width + guard, height + guard};
+    const Plane planes[] = {{3, 1, s.near}, {0, 1, -guard}, {0, -1, width + guard}, {1, 1, -guard}, {1, -1, height + guard}};
     std::copy_n(s.corner, 3, polygon);
     int n = 3;
-    for (int plane = 0; plane < Planes::count; plane++) {
-        const auto is_inside = [&](const vec4& p) { return planes.distance(plane, p) >= 0; };
-        if (is_inside(s.corner[0]) && is_inside(s.corner[1]) && is_inside(s.corner[2])) continue;
+    for (const Plane& plane : planes) {
+        const auto is_inside = [&](const vec4& p) { return plane.distance(p) >= 0; };
+        if (std::all_of(s.corner, s.corner + 3, is_inside)) continue;
         vec4 cut[most_corners];
-        n = clip_polygon(planes, plane, polygon, n, cut);
+        n = clip_polygon(plane, polygon, n, cut);
         std::copy_n(cut, n, polygon);
     }
     return n < 3 ? 0 : n;
@@ -433,219 +417,192 @@ void for_each_span(const Coverage& c, const Point* corners, int y_begin, int y_e
 
 // ---- drawing ----
 
-// The picture is drawn in strips of rows, each by one thread from the first face to the last: so a pixel sees the faces in
-// their order, and a strip's face numbers stay in the cache of its processor.
-constexpr int strip_rows = 16;
-
 struct Face : Coverage {
     int shader, iface, number;
 };
 
-// Some consecutive faces, prepared by one thread, and for each strip those that touch it.
+// Some consecutive faces, prepared by one thread.
 struct Block {
     std::vector<Face> faces;
     std::vector<Point> corners;
-    std::vector<int> first, touching;  // those of strip s: touching[first[s]] to touching[first[s + 1]]
+    std::vector<int> first, touching;  // the faces that touch the strip s: touching[first[s]] to touching[first[s + 1]]
     Counters count;
-
-    void add(IShader& shader, int shader_number, int iface, int number, const mat4& Viewport, int width, int height) {
-        const vec4 in_clip[3] = {shader.vertex(iface, 0), shader.vertex(iface, 1), shader.vertex(iface, 2)};
-        Screen screen;
-        vec4 polygon[most_corners];
-        Point snapped[most_corners];
-        Face face;
-        count.triangles++;
-        int n = 0;
-        if (to_screen(in_clip, Viewport, screen) && !is_outside(screen, width, height)) n = clip(screen, width, height, polygon);
-        if (n == 0) count.outside++;
-        else if (!snap(polygon, n, width, height, face, snapped)) count.between_samples++;
-        else {
-            planes(screen, face);
-            face.first = static_cast<int>(corners.size());
-            face.shader = shader_number, face.iface = iface, face.number = number;
-            corners.insert(corners.end(), snapped, snapped + n);
-            faces.push_back(face);
-        }
-    }
-    void sort_into_strips(int strips) {
-        first.assign(strips + 2, 0);
-        const auto for_each_touch = [&](auto&& visit) {
-            for (int i = 0; i < static_cast<int>(faces.size()); i++)
-                for (int s = faces[i].ymin / strip_rows; s <= faces[i].ymax / strip_rows; s++) visit(s, i);
-        };
-        for_each_touch([&](int s, int) { first[s + 2]++; });
-        for (int s = 0; s < strips; s++) first[s + 2] += first[s + 1];
-        touching.resize(first[strips + 1]);
-        for_each_touch([&](int s, int i) { touching[first[s + 1]++] = i; });
-    }
 };
-
-// The rows of the strip that a thread is drawing: for each pixel the depth and, where colours are wanted, the mark of the
-// face that is nearest there. A row is as long as a whole number of lanes.
-struct Strip {
-    int y_begin, stride;
-    float* depth;
-    std::int32_t* nearest;  // or null
-};
-
-// Draws a face into a strip. Returns the number of samples that it covers.
-long triangle(const Face& face, const Point* corners, const Strip& strip, int mark) {
-    std::int32_t numbers[lanes];
-    for (int i = 0; i < lanes; i++) numbers[i] = i;
-    const pack<std::int32_t> lane(numbers), marks(mark);
-    const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
-    long covered = 0;
-    for_each_span(face, corners, strip.y_begin, strip.y_begin + strip_rows, [&](int y, int x_begin, int x_end) {
-        float* const depth = strip.depth + std::ptrdiff_t{strip.stride} * (y - strip.y_begin);
-        std::int32_t* const nearest = strip.nearest ? strip.nearest + (depth - strip.depth) : nullptr;
-        const coord z_row = face.zy * (y - face.ymin) + face.z0;
-        covered += x_end - x_begin;
-        for (int x0 = x_begin / lanes * lanes; x0 < x_end; x0 += lanes) {
-            const real z = to_real(min(max(zx * to_coord(lane + (x0 - face.xmin)) + z_row, zmin), zmax));
-            const real old = real::load(depth + x0);
-            const mask nearer = (z > old) & (lane > x_begin - x0 - 1) & (lane < x_end - x0);
-            select(nearer, z, old).store(depth + x0);
-            if (nearest) select(nearer, marks, pack<std::int32_t>::load(nearest + x0)).store(nearest + x0);
-        }
-    });
-    return covered;
-}
-
-// Pixels x to x + n - 1 of a row that show the same face, and the number of the next run of that face, -1 for none.
-struct Run {
-    int x, y, n, next;
-};
-
-// Colours the runs of a face, as many pixels at once as there are lanes.
-void shade(const Face& face, const std::vector<Run>& runs, int first, IShader& shader, const mat4& Viewport, TGAImage& picture) {
-    const vec4 in_clip[3] = {shader.vertex(face.iface, 0), shader.vertex(face.iface, 1), shader.vertex(face.iface, 2)};
-    Screen screen;
-    Coverage c = face;
-    to_screen(in_clip, Viewport, screen);
-    const Barycentric b = planes(screen, c);
-    Fragment f;
-    f.face = face.number;
-    constexpr int most = 32 * lanes;  // pixels that are collected before they are coloured
-    std::int32_t xs[most], ys[most];
-    int n = 0;
-    const auto flush = [&] {
-        for (int i = n; i % lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
-        for (int from = 0; from < n; from += lanes) {
-            const coord x = to_coord(pack<std::int32_t>::load(xs + from)), y = to_coord(pack<std::int32_t>::load(ys + from));
-            const coord dx = x - face.xmin, dy = y - face.ymin;
-            f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
-            // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
-            for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
-            const coord sum = f.bar.x + f.bar.y + f.bar.z;
-            for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
-            const Color color = shader.fragment(f);
-            std::int32_t bgr[3][lanes];
-            for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
-            for (int i = 0; i < lanes && from + i < n; i++) {
-                std::uint8_t* const pixel = picture.pixel(xs[from + i], ys[from + i]);
-                for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[k][i]);
-            }
-        }
-        n = 0;
-    };
-    for (int i = first; i >= 0; i = runs[i].next) {
-        for (int x = runs[i].x; x < runs[i].x + runs[i].n; x++) {
-            xs[n] = x, ys[n] = runs[i].y;
-            if (++n == most) flush();
-        }
-    }
-    if (n > 0) flush();
-}
-
-using Shaders = std::function<IShader&(int i, int thread)>;
 
 // What a thread needs for a strip, kept from one to the next.
 struct Workspace {
     std::vector<float> depth;
-    std::vector<std::int32_t> nearest;
-    std::vector<Run> runs;
-    std::vector<int> first;  // for each face of the strip, the number of its first run
+    std::vector<std::int32_t> nearest;  // the mark of the face that is nearest at each pixel, -1 for none
     Counters count;
 };
 
-// What a pass draws into: depths, or colours.
-struct Target {
-    int width, height;
-    DepthBuffer* zbuffer;
-    TGAImage* picture;
+using Shaders = std::function<IShader&(int i, int thread)>;
+
+struct Pass {
+    const Shaders& shader;
+    const int nshaders;
+    const mat4& Viewport;
+    const int width, height;
+    DepthBuffer* const zbuffer;  // one of the two is drawn into
+    TGAImage* const picture;
+
+    // The picture is drawn in strips of rows, each by one thread from the first face to the last: so a pixel sees the
+    // faces in their order. A strip's depths and marks, 8 bytes a pixel, fit into the cache of a core.
+    const int strip_rows = std::clamp(32768 / width, 8, 64), strips = (height + strip_rows - 1) / strip_rows;
+    const int stride = (width + lanes - 1) / lanes * lanes;  // a row is as long as a whole number of lanes
+    std::vector<Block> blocks{};
+
+    Counters draw() {
+        std::vector<int> first{0};  // the number of each shader's first face
+        for (int i = 0; i < nshaders; i++) first.push_back(first[i] + shader(i, 0).end - shader(i, 0).begin);
+        // A thread gets several blocks, in case that some take longer than others; none is worth fewer than 64 faces.
+        const std::int64_t faces = first.back(), n = std::clamp<std::int64_t>(faces / 64, 1, 8 * thread_count());
+        blocks.resize(n);
+        parallel_for(static_cast<int>(n), [&](int b, int thread) {
+            for (auto number = static_cast<int>(faces * b / n), s = 0; number < faces * (b + 1) / n; number++) {
+                while (number >= first[s + 1]) s++;
+                const int iface = shader(s, thread).begin + number - first[s];
+                prepare(shader(s, thread), {{}, s, iface, number}, blocks[b]);
+            }
+            sort_into_strips(blocks[b]);
+        });
+        std::vector<Workspace> spaces(thread_count());
+        parallel_for(strips, [&](int strip, int thread) { draw_strip(strip, thread, spaces[thread]); });
+        Counters total;
+        for (const Block& b : blocks) total += b.count;
+        for (const Workspace& w : spaces) total += w.count;
+        return total;
+    }
+
+    void prepare(IShader& own, Face face, Block& block) const {
+        const vec4 in_clip[3] = {own.vertex(face.iface, 0), own.vertex(face.iface, 1), own.vertex(face.iface, 2)};
+        Screen screen;
+        vec4 polygon[most_corners];
+        Point snapped[most_corners];
+        block.count.triangles++;
+        const bool somewhere = to_screen(in_clip, Viewport, screen) && !is_outside(screen, width, height);
+        const int n = somewhere ? clip(screen, width, height, polygon) : 0;
+        if (n == 0) block.count.outside++;
+        else if (!snap(polygon, n, width, height, face, snapped)) block.count.between_samples++;
+        else {
+            planes(screen, face);
+            face.first = static_cast<int>(block.corners.size());
+            block.corners.insert(block.corners.end(), snapped, snapped + n);
+            block.faces.push_back(face);
+        }
+    }
+
+    void sort_into_strips(Block& b) const {
+        b.first.assign(strips + 2, 0);
+        const auto for_each_touch = [&](auto&& visit) {
+            for (int i = 0; i < static_cast<int>(b.faces.size()); i++)
+                for (int s = b.faces[i].ymin / strip_rows; s <= b.faces[i].ymax / strip_rows; s++) visit(s, i);
+        };
+        for_each_touch([&](int s, int) { b.first[s + 2]++; });
+        for (int s = 0; s < strips; s++) b.first[s + 2] += b.first[s + 1];
+        b.touching.resize(b.first[strips + 1]);
+        for_each_touch([&](int s, int i) { b.touching[b.first[s + 1]++] = i; });
+    }
+
+    void draw_strip(int strip, int thread, Workspace& w) const {
+        const int y_begin = strip * strip_rows, y_end = std::min(y_begin + strip_rows, height);
+        const int cells = stride * (y_end - y_begin);
+        float* depth = zbuffer ? zbuffer->row(y_begin) : (w.depth.resize(cells), w.depth.data());
+        std::fill_n(depth, cells, DepthBuffer::nothing);
+        if (picture) w.nearest.assign(cells, -1);
+        const auto for_each_face = [&](auto&& visit) {
+            int mark = 0;
+            for (const Block& b : blocks)
+                for (int i = b.first[strip]; i < b.first[strip + 1]; i++) visit(b, b.faces[b.touching[i]], mark++);
+        };
+        for_each_face([&](const Block& b, const Face& face, int mark) {
+            w.count.covered += triangle(face, &b.corners[face.first], mark, y_begin, y_end, depth,
+                                        picture ? w.nearest.data() : nullptr);
+        });
+        if (!picture) return;
+        std::memset(picture->pixel(0, y_begin), 0, std::size_t{1} * picture->bytespp() * width * (y_end - y_begin));
+        for_each_face([&](const Block&, const Face& face, int mark) {
+            w.count.shaded += shade(face, mark, shader(face.shader, thread), y_begin, y_end, w.nearest.data());
+        });
+    }
+
+    // Draws a face into the rows of a strip; where it is nearest, nearest (if given) gets its mark. Returns the number of
+    // samples.
+    long triangle(const Face& face, const Point* corners, int mark, int y_begin, int y_end, float* depth,
+                  std::int32_t* nearest) const {
+        std::int32_t numbers[lanes];
+        for (int i = 0; i < lanes; i++) numbers[i] = i;
+        const pack<std::int32_t> lane(numbers), marks(mark);
+        const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
+        long covered = 0;
+        for_each_span(face, corners, y_begin, y_end, [&](int y, int x_begin, int x_end) {
+            const coord z_row = face.zy * (y - face.ymin) + face.z0;
+            covered += x_end - x_begin;
+            for (int x0 = x_begin / lanes * lanes; x0 < x_end; x0 += lanes) {
+                const std::ptrdiff_t at = std::ptrdiff_t{stride} * (y - y_begin) + x0;
+                const real z = to_real(min(max(zx * to_coord(lane + (x0 - face.xmin)) + z_row, zmin), zmax));
+                const real old = real::load(depth + at);
+                const mask nearer = (z > old) & (lane > x_begin - x0 - 1) & (lane < x_end - x0);
+                select(nearer, z, old).store(depth + at);
+                if (nearest) select(nearer, marks, pack<std::int32_t>::load(nearest + at)).store(nearest + at);
+            }
+        });
+        return covered;
+    }
+
+    // Colours those pixels of a strip that have the face's mark, as many at once as there are lanes. Returns their number.
+    long shade(const Face& face, int mark, IShader& own, int y_begin, int y_end, const std::int32_t* nearest) const {
+        constexpr int most = 32 * lanes;  // pixels that are collected before they are coloured
+        std::int32_t xs[most], ys[most];
+        int n = 0;
+        long shaded = 0;
+        Barycentric b;
+        const auto color = [&] {
+            if (shaded == 0) b = start(face, own);
+            shaded += n;
+            for (int i = n; i % lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
+            for (int i = 0; i < n; i += lanes) color_lanes(face, b, own, xs + i, ys + i, std::min(n - i, lanes));
+            n = 0;
+        };
+        for (int y = std::max(y_begin, face.ymin); y < std::min(y_end, face.ymax + 1); y++) {
+            const std::int32_t* const row = nearest + std::ptrdiff_t{stride} * (y - y_begin);
+            for (int x = face.xmin; x <= face.xmax; x++) {
+                if (row[x] != mark) continue;
+                xs[n] = x, ys[n] = y;
+                if (++n == most) color();
+            }
+        }
+        if (n > 0) color();
+        return shaded;
+    }
+
+    // Makes the shader write the varyings of a face.
+    Barycentric start(const Face& face, IShader& own) const {
+        const vec4 in_clip[3] = {own.vertex(face.iface, 0), own.vertex(face.iface, 1), own.vertex(face.iface, 2)};
+        Screen screen;
+        Coverage c = face;
+        to_screen(in_clip, Viewport, screen);
+        return planes(screen, c);
+    }
+
+    void color_lanes(const Face& face, const Barycentric& b, const IShader& own, const std::int32_t* xs,
+                     const std::int32_t* ys, int n) const {
+        const coord x = to_coord(pack<std::int32_t>::load(xs)), y = to_coord(pack<std::int32_t>::load(ys));
+        const coord dx = x - face.xmin, dy = y - face.ymin;
+        Fragment f;
+        f.face = face.number;
+        f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
+        // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
+        for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
+        const coord sum = f.bar.x + f.bar.y + f.bar.z;
+        for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
+        const Color color = own.fragment(f);
+        std::int32_t bgr[3][lanes];
+        for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
+        for (int i = 0; i < n; i++)
+            for (int k = 0; k < 3; k++) picture->pixel(xs[i], ys[i])[k] = static_cast<std::uint8_t>(bgr[k][i]);
+    }
 };
-
-void draw_strip(const std::vector<Block>& blocks, int number, int thread, const Shaders& shader, const mat4& Viewport,
-                const Target& target, Workspace& w) {
-    Strip strip{number * strip_rows, (target.width + lanes - 1) / lanes * lanes, nullptr, nullptr};
-    const int rows = std::min(strip_rows, target.height - strip.y_begin), cells = strip.stride * rows;
-    if (target.picture) {
-        w.depth.resize(cells);
-        w.nearest.assign(cells, -1);
-        strip.depth = w.depth.data(), strip.nearest = w.nearest.data();
-    } else {
-        strip.depth = target.zbuffer->row(strip.y_begin);
-    }
-    std::fill_n(strip.depth, cells, DepthBuffer::nothing);
-    const auto for_each_face = [&](auto&& visit) {
-        int mark = 0;
-        for (const Block& b : blocks)
-            for (int i = b.first[number]; i < b.first[number + 1]; i++) visit(b, b.faces[b.touching[i]], mark++);
-        return mark;
-    };
-    const int faces = for_each_face([&](const Block& b, const Face& face, int mark) {
-        w.count.covered += triangle(face, &b.corners[face.first], strip, mark);
-    });
-    if (!target.picture) return;
-
-    // What is seen of each face: a list of runs.
-    w.runs.clear();
-    w.first.assign(faces, -1);
-    for (int y = 0; y < rows; y++) {
-        const std::int32_t* const nearest = strip.nearest + std::ptrdiff_t{strip.stride} * y;
-        for (int x = 0, end; x < target.width; x = end) {
-            const std::int32_t mark = nearest[x];
-            for (end = x + 1; end < target.width && nearest[end] == mark;) end++;
-            if (mark < 0) continue;
-            w.runs.push_back({x, strip.y_begin + y, end - x, w.first[mark]});
-            w.first[mark] = static_cast<int>(w.runs.size()) - 1;
-            w.count.shaded += end - x;
-        }
-    }
-    TGAImage& picture = *target.picture;
-    std::memset(picture.pixel(0, strip.y_begin), 0, std::size_t{1} * picture.bytespp() * target.width * rows);
-    for_each_face([&](const Block&, const Face& face, int mark) {
-        if (w.first[mark] >= 0) shade(face, w.runs, w.first[mark], shader(face.shader, thread), Viewport, picture);
-    });
-}
-
-Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, const Target& target) {
-    std::vector<int> first{0};  // the number of each shader's first face
-    for (int i = 0; i < nshaders; i++) first.push_back(first[i] + shader(i, 0).end - shader(i, 0).begin);
-    const int faces = first.back(), strips = (target.height + strip_rows - 1) / strip_rows;
-
-    // A thread gets several blocks, in case that some take longer than others, but none is worth fewer than some faces.
-    constexpr int blocks_per_thread = 8, least_faces = 64;
-    std::vector<Block> blocks(std::clamp(faces / least_faces, 1, blocks_per_thread * thread_count()));
-    const auto nblocks = static_cast<std::int64_t>(blocks.size());
-    parallel_for(static_cast<int>(nblocks), [&](int b, int thread) {
-        int s = 0;
-        for (auto number = static_cast<int>(faces * std::int64_t{b} / nblocks); number < faces * (b + std::int64_t{1}) / nblocks; number++) {
-            while (number >= first[s + 1]) s++;
-            IShader& own = shader(s, thread);
-            blocks[b].add(own, s, own.begin + number - first[s], number, Viewport, target.width, target.height);
-        }
-        blocks[b].sort_into_strips(strips);
-    });
-    std::vector<Workspace> spaces(thread_count());
-    parallel_for(strips, [&](int strip, int thread) {
-        draw_strip(blocks, strip, thread, shader, Viewport, target, spaces[thread]);
-    });
-    Counters total;
-    for (const Block& b : blocks) total += b.count;
-    for (const Workspace& w : spaces) total += w.count;
-    return total;
-}
 
 }  // namespace
 
@@ -656,11 +613,11 @@ Counters& Counters::operator+=(const Counters& c) {
 }
 
 Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer) {
-    return draw(shader, nshaders, Viewport, {zbuffer.width(), zbuffer.height(), &zbuffer, nullptr});
+    return Pass{shader, nshaders, Viewport, zbuffer.width(), zbuffer.height(), &zbuffer, nullptr}.draw();
 }
 Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImage& picture) {
     assert(picture.bytespp() >= 3);
-    return draw(shader, nshaders, Viewport, {picture.width(), picture.height(), nullptr, &picture});
+    return Pass{shader, nshaders, Viewport, picture.width(), picture.height(), nullptr, &picture}.draw();
 }
 
 // ---- shadows ----
