@@ -30,10 +30,9 @@ struct Options {  // the lesson's scene; the command line can change each of the
 // ---- pass 1: what the light sees ----
 
 struct DepthShader final : IShader {  // only the z-buffer is wanted: there is no fragment()
-    const Model& model;
     mat4 uniform_M;  // Projection*ModelView
 
-    DepthShader(const Model& m, const Camera& camera) : IShader(0, m.nfaces()), model(m), uniform_M(camera.to_clip()) {}
+    DepthShader(const Model& m, const Camera& camera) : IShader(m, 0, m.nfaces()), uniform_M(camera.to_clip()) {}
 
     vec4 vertex(int iface, int nthvert) override {
         return uniform_M * point(model.vert(iface, nthvert));  // read the vertex of the .obj, take it to clip space
@@ -54,7 +53,6 @@ struct Shadow {                // what the first pass leaves for the second
 struct PhongShader final : IShader {
     const Options& opt;
     const Shadow& shadow;
-    const Model& model;
     const Material& material;
     mat4 uniform_M;        // ModelView
     mat4 uniform_PM;       // Projection*ModelView
@@ -67,7 +65,7 @@ struct PhongShader final : IShader {
     vec3 varying_sb[3];    // the triangle in the shadow buffer
 
     PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m, const Model::Group& group)
-        : IShader(group.begin, group.end), opt(o), shadow(s), model(m), material(m.materials()[group.material]),
+        : IShader(m, group.begin, group.end), opt(o), shadow(s), material(m.materials()[group.material]),
           uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
           uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()

@@ -189,14 +189,13 @@ struct Screen {
     double size, near;
 };
 
-// False for a coordinate beyond the range of a double, which has no place on the screen.
-bool to_screen(const vec4 (&clip)[3], const mat4& Viewport, Screen& s) {
+// Measures the corners. False for a coordinate beyond the range of a double, which has no place on the screen.
+bool measure(Screen& s) {
     s.size = 0, s.near = w_near;
-    for (int i = 0; i < 3; i++) {
-        s.corner[i] = Viewport * clip[i];
+    for (const vec4& p : s.corner) {
         for (int k = 0; k < 4; k++) {
-            if (!std::isfinite(s.corner[i][k])) return false;
-            s.size = std::max(s.size, std::fabs(s.corner[i][k]));
+            if (!std::isfinite(p[k])) return false;
+            s.size = std::max(s.size, std::fabs(p[k]));
         }
     }
     // Clipping adds up to 2^15 times the coordinates: a power of two, which is exact, keeps that in a double's range.
@@ -246,9 +245,24 @@ int clip_polygon(const Plane& plane, const vec4* in, int n, vec4* out) {
     return m;
 }
 
+// A corner after the division by w: on the grid of 1/65536 pixel, and its depth.
+struct Point {
+    std::int32_t x, y;
+    double z;
+};
+
+Point snapped(const vec4& s, int width, int height) {
+    constexpr double one = 1 << subpixel_bits;
+    const vec3 p = project(s);
+    // On a guard plane rounding may land a hair outside: that is no more than 2^-10 of a sub-pixel.
+    return {static_cast<std::int32_t>(std::floor(std::clamp(p.x, -guard, width + guard) * one + .5)),
+            static_cast<std::int32_t>(std::floor(std::clamp(p.y, -guard, height + guard) * one + .5)), p.z};
+}
+
 // Cuts the face to what is in front of the eye and inside the guard band; returns the number of corners, 0 for nothing.
-int clip(const Screen& s, int width, int height, vec4 (&polygon)[most_corners]) {
+int clip(const Screen& s, int width, int height, Point (&corners)[most_corners]) {
     const Plane planes[] = {{3, 1, s.near}, {0, 1, -guard}, {0, -1, width + guard}, {1, 1, -guard}, {1, -1, height + guard}};
+    vec4 polygon[most_corners];
     std::copy_n(s.corner, 3, polygon);
     int n = 3;
     for (const Plane& plane : planes) {
@@ -258,12 +272,10 @@ int clip(const Screen& s, int width, int height, vec4 (&polygon)[most_corners]) 
         n = clip_polygon(plane, polygon, n, cut);
         std::copy_n(cut, n, polygon);
     }
-    return n < 3 ? 0 : n;
+    if (n < 3) return 0;
+    for (int i = 0; i < n; i++) corners[i] = snapped(polygon[i], width, height);
+    return n;
 }
-
-struct Point {
-    std::int32_t x, y;  // in 1/65536 pixel
-};
 
 // What a face covers: a convex polygon of n snapped corners, the pixels whose centres lie in its box, and its depth, which
 // is linear on the screen.
@@ -274,25 +286,19 @@ struct Coverage {
     double zmin, zmax;   // ... and no smaller or larger than those of its corners
 };
 
-// Divides by w and snaps; false where the polygon covers no pixel's centre.
-bool snap(const vec4* polygon, int n, int width, int height, Coverage& c, Point* corners) {
-    constexpr double one = 1 << subpixel_bits;
+// The box and the range of depths of a polygon; false where it covers no pixel's centre.
+bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
     constexpr std::int32_t half = 1 << (subpixel_bits - 1);
     c.n = n;
-    c.zmin = std::numeric_limits<double>::infinity(), c.zmax = -c.zmin;
-    Point low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};
-    for (int i = 0; i < n; i++) {
-        const vec3 p = project(polygon[i]);
-        // On a guard plane rounding may land a hair outside: that is no more than 2^-10 of a sub-pixel.
-        corners[i] = {static_cast<std::int32_t>(std::floor(std::clamp(p.x, -guard, width + guard) * one + .5)),
-                      static_cast<std::int32_t>(std::floor(std::clamp(p.y, -guard, height + guard) * one + .5))};
-        low = {std::min(low.x, corners[i].x), std::min(low.y, corners[i].y)};
-        high = {std::max(high.x, corners[i].x), std::max(high.y, corners[i].y)};
-        c.zmin = std::min(c.zmin, p.z), c.zmax = std::max(c.zmax, p.z);
+    Point low = corners[0], high = low;
+    for (int i = 1; i < n; i++) {
+        const Point& p = corners[i];
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
     }
     // A depth beyond the range of a float is drawn as its largest one, not as infinity.
     constexpr double most = std::numeric_limits<float>::max();
-    c.zmin = std::clamp(c.zmin, -most, most), c.zmax = std::clamp(c.zmax, -most, most);
+    c.zmin = std::clamp(low.z, -most, most), c.zmax = std::clamp(high.z, -most, most);
     // Pixel x has its centre at x + half: the first at or right of low, the last at or left of high.
     c.xmin = std::max(0, (low.x + half - 1) >> subpixel_bits);
     c.ymin = std::max(0, (low.y + half - 1) >> subpixel_bits);
@@ -421,6 +427,14 @@ struct Face : Coverage {
     int shader, iface, number;
 };
 
+// A vertex on the screen, homogeneous; where clipping leaves it alone also snapped.
+struct Vertex {
+    int number = -1;
+    vec4 screen;
+    bool inside;
+    Point point;
+};
+
 // Some consecutive faces, prepared by one thread.
 struct Block {
     std::vector<Face> faces;
@@ -459,10 +473,11 @@ struct Pass {
         const std::int64_t faces = first.back(), n = std::clamp<std::int64_t>(faces / 64, 1, 8 * thread_count());
         blocks.resize(n);
         parallel_for(static_cast<int>(n), [&](int b, int thread) {
+            std::vector<Vertex> last(1024);
             for (auto number = static_cast<int>(faces * b / n), s = 0; number < faces * (b + 1) / n; number++) {
-                while (number >= first[s + 1]) s++;
+                while (number >= first[s + 1]) s++, last.assign(last.size(), {});
                 const int iface = shader(s, thread).begin + number - first[s];
-                prepare(shader(s, thread), {{}, s, iface, number}, blocks[b]);
+                prepare(shader(s, thread), {{}, s, iface, number}, last, blocks[b]);
             }
             sort_into_strips(blocks[b]);
         });
@@ -474,20 +489,39 @@ struct Pass {
         return total;
     }
 
-    void prepare(IShader& own, Face face, Block& block) const {
-        const vec4 in_clip[3] = {own.vertex(face.iface, 0), own.vertex(face.iface, 1), own.vertex(face.iface, 2)};
+    // The corner of a face, from those that were asked for last if it is there: neighbouring faces share their vertices.
+    const Vertex& vertex(IShader& own, int iface, int nthvert, std::vector<Vertex>& last) const {
+        const int number = own.vertex_number(iface, nthvert);
+        Vertex& v = last[number % last.size()];
+        if (v.number != number) {
+            v.number = number;
+            v.screen = Viewport * own.vertex(iface, nthvert);
+            const vec4& s = v.screen;
+            v.inside = s.w >= w_near && s.x >= -guard * s.w && s.x <= (width + guard) * s.w && s.y >= -guard * s.w &&
+                       s.y <= (height + guard) * s.w && s.w <= 0x1p1000 && std::isfinite(s.z);
+            if (v.inside) v.point = snapped(s, width, height);
+        }
+        return v;
+    }
+
+    void prepare(IShader& own, Face face, std::vector<Vertex>& last, Block& block) const {
         Screen screen;
-        vec4 polygon[most_corners];
-        Point snapped[most_corners];
+        Point corners[most_corners];
+        bool inside = true;
+        for (int i = 0; i < 3; i++) {
+            const Vertex& v = vertex(own, face.iface, i, last);
+            screen.corner[i] = v.screen, corners[i] = v.point;
+            inside = inside && v.inside;
+        }
         block.count.triangles++;
-        const bool somewhere = to_screen(in_clip, Viewport, screen) && !is_outside(screen, width, height);
-        const int n = somewhere ? clip(screen, width, height, polygon) : 0;
+        const bool somewhere = measure(screen) && !is_outside(screen, width, height);
+        const int n = !somewhere ? 0 : inside ? 3 : clip(screen, width, height, corners);
         if (n == 0) block.count.outside++;
-        else if (!snap(polygon, n, width, height, face, snapped)) block.count.between_samples++;
+        else if (!bound(corners, n, width, height, face)) block.count.between_samples++;
         else {
             planes(screen, face);
             face.first = static_cast<int>(block.corners.size());
-            block.corners.insert(block.corners.end(), snapped, snapped + n);
+            block.corners.insert(block.corners.end(), corners, corners + n);
             block.faces.push_back(face);
         }
     }
@@ -578,10 +612,10 @@ struct Pass {
 
     // Makes the shader write the varyings of a face.
     Barycentric start(const Face& face, IShader& own) const {
-        const vec4 in_clip[3] = {own.vertex(face.iface, 0), own.vertex(face.iface, 1), own.vertex(face.iface, 2)};
         Screen screen;
+        for (int i = 0; i < 3; i++) screen.corner[i] = Viewport * own.vertex(face.iface, i);
+        measure(screen);
         Coverage c = face;
-        to_screen(in_clip, Viewport, screen);
         return planes(screen, c);
     }
 

@@ -105,15 +105,16 @@ using Color = vec<3, real>;  // a TGAColor in each lane: blue, green, red from 0
 // What a shader computes is written into its members: a uniform is the same for a whole pass, a varying is written for
 // each corner of a face by vertex() and read by fragment(). Each thread draws with a copy of its own.
 struct IShader {
-    int begin = 0, end = 0;  // the faces that it draws, of its model
+    const Model& model;
+    const int begin, end;  // the faces that it draws, of its model
     virtual ~IShader() = default;
-    virtual vec4 vertex(int iface, int nthvert) = 0;             // the corner in clip space; nthvert 0, 1, 2
+    virtual int vertex_number(int iface, int nthvert) const { return model.corner(iface, nthvert).vert; }
+    virtual vec4 vertex(int iface, int nthvert) = 0;  // the corner in clip space; nthvert 0, 1, 2
     virtual Color fragment(const Fragment&) const { return {}; }  // not called where depth alone is wanted
 
 protected:
-    IShader(int begin_, int end_) : begin(begin_), end(end_) {}
+    IShader(const Model& m, int begin_, int end_) : model(m), begin(begin_), end(end_) {}
     IShader(const IShader&) = default;
-    IShader& operator=(const IShader&) = default;
 };
 
 // A varying at a fragment: its values at the corners, weighted.

@@ -5,7 +5,12 @@
 // Three corners a face. A pixel gets the number of its face, from 1 on, as b + 256 g + 65536 r.
 struct ClipShader : IShader {
     const std::vector<vec4>& clip;
-    explicit ClipShader(const std::vector<vec4>& c) : IShader(0, static_cast<int>(c.size() / 3)), clip(c) {}
+    explicit ClipShader(const std::vector<vec4>& c) : IShader(no_model(), 0, static_cast<int>(c.size() / 3)), clip(c) {}
+    static const Model& no_model() {
+        static const Model none;
+        return none;
+    }
+    int vertex_number(int iface, int nthvert) const override { return iface * 3 + nthvert; }
     vec4 vertex(int iface, int nthvert) override { return clip[iface * 3 + nthvert]; }
     Color fragment(const Fragment& f) const override {
         const int n = f.face + 1;
