@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <functional>
 #include <iostream>
 #include <sstream>
 #include <string>
@@ -27,7 +26,7 @@
 
 struct Test {
     const char* name;
-    std::function<void()> body;
+    void (*body)();
 };
 
 inline std::vector<Test>& all_tests() {
@@ -41,13 +40,13 @@ inline int& failed_checks() {
 }
 
 struct Registration {
-    Registration(const char* name, std::function<void()> body) { all_tests().push_back({name, std::move(body)}); }
+    Registration(const char* name, void (*body)()) { all_tests().push_back({name, body}); }
 };
 
 #define CHECK_JOIN2(a, b) a##b
 #define CHECK_JOIN(a, b) CHECK_JOIN2(a, b)
-#define TEST_NAMED(name, id)                                          \
-    static void CHECK_JOIN(test_, id)();                              \
+#define TEST_NAMED(name, id)                                                              \
+    static void CHECK_JOIN(test_, id)();                                                  \
     static const Registration CHECK_JOIN(registration_, id){name, CHECK_JOIN(test_, id)}; \
     static void CHECK_JOIN(test_, id)()
 #define TEST(name) TEST_NAMED(name, __LINE__)
@@ -65,33 +64,34 @@ inline bool report_failure(const char* file, int line, const std::string& what) 
     return false;
 }
 
+template <typename A, typename B>
+bool is_equal_or_report(const A& a, const B& b, const char* file, int line, const char* text) {
+    return a == b || report_failure(file, line, text + (": " + shown(a)) + " is not " + shown(b));
+}
+
+inline bool is_near_or_report(double a, double b, double most, const char* file, int line, const char* text) {
+    const double d = std::fabs(a - b);
+    if (d <= most) return true;
+    const std::string values = shown(a) + " and " + shown(b);
+    return report_failure(file, line, text + (": " + values) + " differ by " + shown(d) + " > " + shown(most));
+}
+
+template <typename Body>
+bool throws_or_report(const Body& body, const char* wanted, const char* file, int line, const char* text) {
+    try {
+        body();
+    } catch (const std::exception& e) {
+        const std::string what = e.what();
+        return what.find(wanted) != what.npos || report_failure(file, line, "threw " + what + ", not " + wanted);
+    }
+    return report_failure(file, line, std::string("did not throw: ") + text);
+}
+
 #define CHECK(condition) ((condition) ? true : report_failure(__FILE__, __LINE__, "failed: " #condition))
-#define CHECK_EQ(a, b)                                                                                                  \
-    [&](const auto& left_, const auto& right_) {                                                                        \
-        return left_ == right_ ? true                                                                                   \
-                               : report_failure(__FILE__, __LINE__, std::string(#a " == " #b ": ") + shown(left_) +     \
-                                                                        " is not " + shown(right_));                    \
-    }(a, b)
-#define CHECK_NEAR(a, b, tolerance)                                                                                     \
-    [&](double left_, double right_, double tolerance_) {                                                               \
-        return std::fabs(left_ - right_) <= tolerance_                                                                  \
-                   ? true                                                                                               \
-                   : report_failure(__FILE__, __LINE__, std::string(#a " near " #b ": ") + shown(left_) + " and " +     \
-                                                            shown(right_) + " differ by " +                             \
-                                                            shown(std::fabs(left_ - right_)) + " > " + shown(tolerance_)); \
-    }(a, b, tolerance)
+#define CHECK_EQ(a, b) is_equal_or_report(a, b, __FILE__, __LINE__, #a " == " #b)
+#define CHECK_NEAR(a, b, tolerance) is_near_or_report(a, b, tolerance, __FILE__, __LINE__, #a " near " #b)
 // The statement must throw; the message must contain the text.
-#define CHECK_THROWS(statement, text)                                                                                   \
-    [&] {                                                                                                               \
-        try {                                                                                                           \
-            statement;                                                                                                  \
-        } catch (const std::exception& e) {                                                                             \
-            return std::strstr(e.what(), text) ? true                                                                   \
-                                               : report_failure(__FILE__, __LINE__, std::string("threw \"") + e.what() + \
-                                                                                        "\", not \"" + text + "\"");    \
-        }                                                                                                               \
-        return report_failure(__FILE__, __LINE__, "did not throw: " #statement);                                        \
-    }()
+#define CHECK_THROWS(statement, text) throws_or_report([&] { statement; }, text, __FILE__, __LINE__, #statement)
 
 inline int run_tests(int argc, char** argv) {
     const char* only = argc > 1 ? argv[1] : "";
