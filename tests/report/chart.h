@@ -8,10 +8,10 @@
 struct Figures {  // of one method at one size
     std::string method;
     int size = 0;  // texels a side, 0 for a method without a buffer
-    double acne = 0, self = 0, leak = 0,
-           error = 0;  // % of the facing pixels; self: the part of the acne by the own face
-    double rmse = 0;   // of 255
-    double depth_ms = 0, shade_ms = 0, total_ms = 0;  // medians
+    std::vector<std::string> arguments = {};               // that ask the program for it
+    double acne = 0, leak = 0, error = 0;                  // falsely dark, falsely lit, both: % of the facing pixels
+    double rmse = 0;                                       // of 255
+    double depth_ms = 0, shade_ms = 0, total_ms = 0;       // medians
     long long bytes = 0;
     bool rival = true;      // whether it is a shadow method at all: only those are compared
     bool frontier = false;  // no rival is as good and as fast, and better in one of the two
@@ -19,7 +19,7 @@ struct Figures {  // of one method at one size
         double floor, coefficient, texel, boundary_per_area;  // %, 1, the scene's unit, one over it
         double predicted, measured, noise;                    // %; the noise is one standard deviation of the measured
     };
-    std::optional<Prediction> prediction;
+    std::optional<Prediction> prediction = {};
 };
 
 // Sets `frontier` by error and total_ms.

@@ -1,319 +1,214 @@
-// report.cpp: error against run time, for each way of computing the shadow. It runs the program that it judges, as a
-// child: with --report for the errors, several times without for the times. It prints a table, what theory says, and how
-// far stiff cases can be driven; it writes report.csv, stiffness.csv and report.svg.
+// report.cpp: what a picture's shadows are off by, and error against run time for each way of computing them. It runs the
+// program that it judges, as a child.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <iostream>
-#include <thread>
 
 #include "chart.h"
-#include "model.h"
+#include "judge.h"
 #include "prediction.h"
-#include "program.h"
 #include "stiffness.h"
 
 namespace {
 
-struct Options {
-    std::vector<std::string> models;
-    std::filesystem::path out = ".";
-    std::string eye, light;  // as umbra takes them; empty: its defaults
-    int rounds = 5, threads = 1;
-};
+constexpr const char* usage_text = R"(usage: report UMBRA'S OPTIONS AND MODELS
+       report [-o DIR] [--rounds N] [--threads N] [umbra's options and models]
 
-constexpr const char* usage_text = R"(usage: report [options] [model.obj ...]
+The first prints what umbra's picture is off by: pixels that only one of picture and truth covers; the pixels that face the
+light; those of them that are falsely dark and falsely lit, as counts and in percent; and the RMSE of their colours.
 
-Prints acne, leak, error, RMSE, milliseconds and bytes of each shadow method at each size of its buffer, and what
-theory says of the error; and the errors of stiff cases. Writes report.csv, stiffness.csv and report.svg. Several models share one scene. Without a model: the idol.
+The second, also without any argument, prints these figures, milliseconds and bytes of each shadow method at each size of
+its buffer, and what theory says of the error; and the errors of stiff cases. It writes report.csv, stiffness.csv and
+report.svg.
 
   -o DIR             folder of the three files (.)
   --rounds N         runs of each for the times, in turn; the median counts (5)
-  --threads N        of the program that is measured (1)
-  --eye X,Y,Z        the viewer (1,1,4)
-  --light X,Y,Z      direction towards the light (1,1,0)
-  --help
+  --threads N        of the program where it is timed (1)
 )";
 
-constexpr int sizes[] = {200, 400, 800, 1600, 3200, 6400};
-constexpr double bias = 43.34;              // the lesson's, of a depth of 2000 for two units of the scene
-constexpr double scene_bias = bias / 1000;  // in the scene's unit
-constexpr int picture_side = 800;           // pixels of what is timed
-constexpr int fine_side =
-    3 * picture_side;                // ... of what is held against theory: at 6400 few pixels of 800 x 800 are wrong
+constexpr double bias = 43.34;       // the lesson's, of a depth of 2000 for two units of the scene
+constexpr int picture_side = 800;    // pixels of what is timed
+constexpr int fine_side = 3 * 800;   // ... of what is held against theory: at 6400 few pixels of 800 x 800 are wrong
 constexpr double tolerance = .10;    // how near theory should be ...
 constexpr int tolerated_from = 800;  // ... from which size up
 
-vec3 parse_vector(const std::string& option, const std::string& value) {
-    vec3 v;
-    char rest;
-    if (std::sscanf(value.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !std::isfinite(v.x) ||
-        !std::isfinite(v.y) || !std::isfinite(v.z) || v == vec3{})
-        throw std::invalid_argument(option + ": \"" + value + "\" is not a point X,Y,Z");
-    return v;
-}
-
-Options parse(int argc, char** argv) {
-    Options opt;
-    for (int i = 1; i < argc; i++) {
-        const std::string arg = argv[i];
-        const auto value = [&]() -> std::string {
-            if (++i == argc) throw std::invalid_argument(arg + ": a value is missing");
-            return argv[i];
-        };
-        const auto number = [&](int most) {
-            const std::string text = value();
-            int n = 0;
-            char rest;
-            if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most)
-                throw std::invalid_argument(arg + ": \"" + text + "\" is not 1 to " + std::to_string(most));
-            return n;
-        };
-        if (arg == "--help") std::exit(std::fputs(usage_text, stdout) < 0);
-        else if (arg == "-o") opt.out = value();
-        else if (arg == "--rounds") opt.rounds = number(1000);
-        else if (arg == "--threads") opt.threads = number(256);
-        else if (arg == "--eye") parse_vector(arg, opt.eye = value());
-        else if (arg == "--light") parse_vector(arg, opt.light = value());
-        else if (arg.size() > 1 && arg[0] == '-') throw std::invalid_argument("unknown option " + arg);
-        else opt.models.push_back(arg);
-    }
-    if (opt.models.empty()) opt.models.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
-    return opt;
-}
-
-// ---- the program that is judged ----
-
-// The viewer, the light and the models, as arguments.
-std::string scene_of(const Options& opt) {
-    std::string arguments;
-    if (!opt.eye.empty()) arguments.append(" --eye ").append(quoted(opt.eye));
-    if (!opt.light.empty()) arguments.append(" --light ").append(quoted(opt.light));
-    for (const std::string& model : opt.models) arguments.append(" ").append(quoted(model));
-    return arguments;
-}
-
-struct Configuration {
-    enum class Kind { map, constant, exact, off } kind;
-    int size;  // texels a side, 0 without a buffer
-
-    std::string name() const {
-        switch (kind) {
-            case Kind::map:
-                return "shadow map";
-            case Kind::constant:
-                return "constant bias";
-            case Kind::exact:
-                return "exact";
-            default:
-                return "off";
-        }
-    }
-    std::string arguments() const {
-        switch (kind) {
-            case Kind::map:
-                return "--shadow map --shadow-size " + std::to_string(size);
-            case Kind::constant:
-                return "--bias 43.34 --shadow-size " + std::to_string(size);
-            case Kind::exact:
-                return "--shadow exact";
-            default:
-                return "--shadow off";
-        }
-    }
+struct Options {
+    std::filesystem::path out;
+    int rounds, threads;
+    Arguments scene;  // umbra's
 };
 
-double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    const std::size_t half = values.size() / 2;
-    return values.size() % 2 ? values[half] : (values[half - 1] + values[half]) / 2;
-}
-
-Figures measure_error(const Program& umbra, const Options& opt, const Configuration& c) {
-    const Values said = umbra.run("--report " + c.arguments() + scene_of(opt));
-    Figures f;
-    f.method = c.name();
-    f.size = c.size;
-    f.rival = c.kind != Configuration::Kind::off;
-    f.acne = value_of(said, "falsely_dark_percent");
-    const double facing = value_of(said, "facing");
-    f.self = facing > 0 ? 100 * value_of(said, "self") / facing : 0;
-    f.leak = value_of(said, "falsely_lit_percent");
-    f.error = value_of(said, "error_percent");
-    f.rmse = value_of(said, "rmse");
-    f.bytes = std::llround(value_of(said, "shadow_bytes"));
-    return f;
-}
-
-// All configurations in turn, round after round: what slows the machine down for a while slows all of them.
-void measure_times(const Program& umbra, const Options& opt, const std::vector<Configuration>& configurations,
-                   std::vector<Figures>& figures) {
-    struct Times {
-        std::vector<double> depth, shade, total;
+Options parse(Arguments arguments) {
+    const auto taken = [&](const std::string& option, const std::string& otherwise) {
+        const auto at = std::find(arguments.begin(), arguments.end(), option);
+        if (at == arguments.end()) return otherwise;
+        if (at + 1 == arguments.end()) throw std::invalid_argument(option + ": a value is missing");
+        const std::string value = at[1];
+        arguments.erase(at, at + 2);
+        return value;
     };
-    std::vector<Times> times(configurations.size());
+    const auto number_taken = [&](const std::string& option, const std::string& otherwise, int most) {
+        const std::string text = taken(option, otherwise);
+        int n = 0;
+        char rest;
+        if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most)
+            throw std::invalid_argument(option + ": \"" + text + "\" is not 1 to " + std::to_string(most));
+        return n;
+    };
+    const std::string out = taken("-o", ".");
+    const int rounds = number_taken("--rounds", "5", 1000), threads = number_taken("--threads", "1", 256);
+    return {out, rounds, threads, arguments};
+}
+
+Arguments size_of(int side) { return {"--size", std::to_string(side) + "x" + std::to_string(side)}; }
+
+std::vector<Figures> methods() {
+    std::vector<Figures> all;
+    for (const auto& [name, arguments] : {std::pair<const char*, Arguments>{"shadow map", {"--shadow", "map"}},
+                                          {"constant bias", {"--bias", "43.34"}}})
+        for (const int size : {200, 400, 800, 1600, 3200, 6400})
+            all.push_back({name, size, joined(arguments, {"--shadow-size", std::to_string(size)})});
+    all.push_back({"exact", 0, {"--shadow", "exact"}});
+    all.push_back({"off", 0, {"--shadow", "off"}});
+    all.back().rival = false;
+    return all;
+}
+
+void measure_errors(const Program& umbra, const Options& opt, std::vector<Figures>& figures) {
+    Judge judge(umbra, joined(opt.scene, size_of(picture_side)));
+    for (Figures& f : figures) {
+        std::cerr << "report: errors of " << f.method << ' ' << f.size << '\n';
+        const PictureError e = judge.error(f.arguments);
+        f.acne = e.percent(e.falsely_dark), f.leak = e.percent(e.falsely_lit), f.error = e.percent(), f.rmse = e.rmse;
+    }
+}
+
+// All methods in turn, round after round: what slows the machine down for a while slows all of them.
+void measure_times(const Program& umbra, const Options& opt, std::vector<Figures>& figures) {
+    std::vector<std::vector<double>> depth(figures.size()), shade = depth, total = depth;
+    const Arguments scene = joined(joined(opt.scene, size_of(picture_side)), {"--threads", std::to_string(opt.threads)});
     for (int round = 0; round < opt.rounds; round++) {
         std::cerr << "report: times, round " << round + 1 << " of " << opt.rounds << '\n';
-        for (std::size_t i = 0; i < configurations.size(); i++) {
-            const std::string threads = " --threads " + std::to_string(opt.threads);
-            const Values said = umbra.run(configurations[i].arguments() + threads + scene_of(opt));
-            const double depth = value_of(said, "depth_ms"), shade = value_of(said, "shade_ms");
-            times[i].depth.push_back(depth), times[i].shade.push_back(shade), times[i].total.push_back(depth + shade);
+        for (std::size_t i = 0; i < figures.size(); i++) {
+            const Values said = umbra.run(joined(scene, figures[i].arguments));
+            depth[i].push_back(value_of(said, "depth_ms")), shade[i].push_back(value_of(said, "shade_ms"));
+            total[i].push_back(depth[i].back() + shade[i].back());
+            figures[i].bytes = std::llround(value_of(said, "shadow_bytes"));
         }
     }
-    for (std::size_t i = 0; i < times.size(); i++)
-        figures[i].depth_ms = median(times[i].depth), figures[i].shade_ms = median(times[i].shade),
-        figures[i].total_ms = median(times[i].total);
+    const auto median = [](std::vector<double>& values) {
+        std::sort(values.begin(), values.end());
+        return (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
+    };
+    for (std::size_t i = 0; i < figures.size(); i++)
+        figures[i].depth_ms = median(depth[i]), figures[i].shade_ms = median(shade[i]), figures[i].total_ms = median(total[i]);
 }
 
-// ---- theory ----
-
-void predict_errors(const Program& umbra, const Options& opt, const std::vector<Configuration>& configurations,
-                    std::vector<Figures>& figures) {
-    std::vector<Model> models;
-    for (const std::string& path : opt.models) models.emplace_back(path), models.back().fit();
-    const RayCaster caster(models);
-    View view;  // umbra's defaults
-    view.width = view.height = fine_side;
-    if (!opt.eye.empty()) view.eye = parse_vector("--eye", opt.eye);
-    const vec3 to_light = opt.light.empty() ? vec3{1, 1, 0} : parse_vector("--light", opt.light);
-    constexpr int needles = 3;
-    const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-    const double unit = mean_distance({1, 1});
-
+void predict_errors(const Program& umbra, const Options& opt, std::vector<Figures>& figures) {
+    const Arguments fine = joined(opt.scene, size_of(fine_side));
+    const Scene scene(fine, umbra.folder());
+    const Theorist theorist(RayCaster(scene.models), scene.view, scene.light, scene.threads);
     // The needles of the constant bias, up to sqrt(2)/25 of it long, are safe on surfaces of a slope up to 17.
-    constexpr double short_texel = scene_bias / 25;
-    std::cerr << "report: needles for the constant bias\n";
-    const Theory constant =
-        theory_of_constant_bias(caster, view, to_light, scene_bias, {short_texel, short_texel}, needles, threads);
-
-    for (std::size_t i = 0; i < configurations.size(); i++) {
-        const Configuration& c = configurations[i];
-        if (c.kind != Configuration::Kind::map && c.kind != Configuration::Kind::constant) continue;
-        std::cerr << "report: theory for " << c.name() << ' ' << c.size << '\n';
-        const bool at_corner = c.kind == Configuration::Kind::constant;
-        const Theory t = at_corner
-                             ? constant.with_texels(2 / (.75 * c.size) / short_texel)  // [-1,1] on 3/4 of the buffer
-                             : theory_of_derived_bias(caster, view, to_light,
-                                                      fitted_texel(caster, to_light, view.up, c.size), needles, threads);
-        const std::string fine = "--size " + std::to_string(fine_side) + "x" + std::to_string(fine_side) +
-                                 " --threads " + std::to_string(threads);
-        const Values said = umbra.run("--report " + fine + " " + c.arguments() + scene_of(opt));
-        const double wrong = value_of(said, "falsely_dark") + value_of(said, "falsely_lit");
-        const double facing = std::max(1., value_of(said, "facing"));
-        Figures::Prediction p;
-        p.floor = 100 * t.floor;
-        p.coefficient = (at_corner ? 2 : 1) * nearest_texel_error;
-        p.texel = t.mean_needle / unit /
-                  (at_corner ? 2 : 1);  // the side of the square that has the mean distance of this one
-        p.boundary_per_area = t.boundary_per_area;
-        p.predicted = 100 * t.wrong();
-        p.measured = 100 * wrong / facing;
-        p.noise = 100 * std::sqrt(wrong) / facing;  // if pixels were wrong independently
-        figures[i].prediction = p;
+    constexpr double scene_bias = bias / 1000, short_texel = scene_bias / 25;
+    const Theory constant = theorist.constant_bias(scene_bias, {short_texel, short_texel});
+    Judge judge(umbra, fine);
+    for (Figures& f : figures) {
+        if (!f.size) continue;
+        std::cerr << "report: theory for " << f.method << ' ' << f.size << '\n';
+        const int at_corner = f.method == "constant bias";
+        const Theory t = at_corner ? constant.with_texels(2 / (.75 * f.size) / short_texel)  // [-1,1] on 3/4 of the buffer
+                                   : theorist.derived_bias(theorist.fitted_texel(f.size));
+        const PictureError e = judge.error(f.arguments);
+        const double wrong = static_cast<double>(e.falsely_dark + e.falsely_lit);
+        // The texel: the side of the square that has the mean distance of this one. The noise: if pixels were wrong
+        // independently.
+        f.prediction = {.floor = 100 * t.floor, .coefficient = (1 + at_corner) * nearest_texel_error,
+                        .texel = t.mean_needle / mean_distance({1, 1}) / (1 + at_corner),
+                        .boundary_per_area = t.boundary_per_area, .predicted = 100 * t.wrong(), .measured = e.percent(),
+                        .noise = e.percent(1) * std::sqrt(wrong)};
     }
 }
 
-// ---- what is printed ----
-
-void print_table(const std::vector<Figures>& figures) {
-    std::printf("%-14s %5s %8s %8s %8s %8s %7s %8s %8s %8s %11s\n", "method", "size", "acne %", "of self", "leak %",
-                "error %", "RMSE", "depth ms", "shade ms", "both ms", "bytes");
-    for (const Figures& f : figures)
-        std::printf("%-14s %5s %8.4f %8.4f %8.4f %8.4f %7.3f %8.2f %8.2f %8.2f %11lld%s\n", f.method.c_str(),
-                    f.size ? std::to_string(f.size).c_str() : "-", f.acne, f.self, f.leak, f.error, f.rmse, f.depth_ms,
-                    f.shade_ms, f.total_ms, f.bytes, f.frontier ? "  *" : "");
-    std::puts("* on the efficient frontier: no other method is as fast and as good, and better in one of the two");
-}
-
-void print_predictions(const std::vector<Figures>& figures) {
-    std::printf(
-        "\nTheory: error = floor + coefficient * h * L/A, h the texel's side, L/A the shadow boundary's length per "
-        "area.\n"
-        "Measured on %d x %d pixels, with one standard deviation of its noise.\n"
-        "%-14s %5s %8s %7s %9s %7s %9s %9s %8s %6s\n",
-        fine_side, fine_side, "method", "size", "floor %", "coeff.", "h", "L/A", "theory %", "measured", "+-", "ratio");
-    int within = 0, of = 0;
-    for (const Figures& f : figures) {
-        if (!f.prediction) continue;
-        const auto& p = *f.prediction;
-        const double ratio = p.predicted > 0 ? p.measured / p.predicted : 1;
-        if (f.size >= tolerated_from) of++, within += std::fabs(ratio - 1) <= tolerance;
-        std::printf("%-14s %5d %8.4f %7.4f %9.6f %7.3f %9.4f %9.4f %8.4f %6.3f%s\n", f.method.c_str(), f.size, p.floor,
-                    p.coefficient, p.texel, p.boundary_per_area, p.predicted, p.measured, p.noise, ratio,
-                    f.size >= tolerated_from && std::fabs(ratio - 1) > tolerance ? "  off" : "");
-    }
-    std::printf("%d of %d within %.0f %% of theory from size %d up\n", within, of, 100 * tolerance, tolerated_from);
-}
-
-void print_stiffness(const std::vector<StiffRow>& rows) {
-    std::puts("\nStiff and extreme cases: the error as each grows, and the step where it is more than it may be.");
-    std::string family;
-    for (const StiffRow& row : rows) {
-        if (row.family != family) {
-            std::printf("\n%-34s", (family = row.family).c_str());
-            for (const StiffRow::Step& s : row.steps) std::printf(" %8.3g", s.stiffness);
-            std::puts("");
+// A table of commas in columns: the first two, and those from `begin` up to `end`.
+void print_columns(const std::string& csv, int begin, int end) {
+    std::istringstream lines(csv);
+    std::vector<std::vector<std::string>> rows;
+    std::vector<int> widths;
+    for (std::string line, cell; std::getline(lines, line);) {
+        std::istringstream cells(line);
+        rows.emplace_back();
+        for (int column = 0; std::getline(cells, cell, ','); column++) {
+            if (column >= 2 && (column < begin || column >= end)) continue;
+            std::erase(cell, '"');
+            rows.back().push_back(cell);
+            widths.resize(std::max(widths.size(), rows.back().size()));
+            int& width = widths[rows.back().size() - 1];
+            width = std::max(width, static_cast<int>(cell.size()));
         }
-        std::printf("  %-32s", row.measure.c_str());
-        for (const StiffRow::Step& s : row.steps) std::printf(" %8.2g", s.error);
-        if (row.breaks()) std::printf("  breaks at %g", row.breaks()->stiffness);
+    }
+    for (const auto& row : rows) {
+        for (std::size_t i = 0; i < row.size(); i++)
+            std::printf(i < 1 ? "%-*s" : "  %*s", widths[i], row[i].c_str());
         std::puts("");
     }
 }
 
-void write(const std::filesystem::path& path, const std::string& text) {
-    write_bytes(path, Bytes(text.begin(), text.end()));
+void print(const std::vector<Figures>& figures, const std::vector<StiffRow>& stiff) {
+    print_columns(csv(figures), 2, 11);
+    std::puts("frontier: no other method is as fast and as good, and better in one of the two\n\n"
+              "Theory: error = floor + coefficient * h * L/A, h the texel's side, L/A the shadow boundary's length per area.");
+    std::printf("Measured on %d x %d pixels, with one standard deviation of its noise.\n", fine_side, fine_side);
+    print_columns(csv(figures), 11, 18);
+    int within = 0, of = 0;
+    for (const Figures& f : figures) {
+        if (!f.prediction || f.size < tolerated_from) continue;
+        of++, within += std::fabs(f.prediction->measured - f.prediction->predicted) <= tolerance * f.prediction->predicted;
+    }
+    std::printf("%d of %d within %.0f %% of theory from size %d up\n", within, of, 100 * tolerance, tolerated_from);
+    std::puts("\nStiff and extreme cases: the error as each grows, and from where it is more than is bearable.");
+    print_columns(csv(stiff), 2, 5);
 }
 
-std::string joined_names(const std::vector<std::string>& models) {
-    std::string names;
-    for (const std::string& model : models)
-        names += (names.empty() ? "" : ", ") + std::filesystem::path(model).stem().string();
-    return names;
+void make_table(const Program& umbra, const Options& opt) {
+    std::filesystem::create_directories(opt.out);
+    std::vector<Figures> figures = methods();
+    measure_errors(umbra, opt, figures);
+    measure_times(umbra, opt, figures);
+    predict_errors(umbra, opt, figures);
+    mark_frontier(figures);
+    const std::vector<StiffRow> stiff = measure_stiffness(umbra);
+    print(figures, stiff);
+
+    std::string title = "Shadow error against time:";
+    for (const std::string& path : Scene(opt.scene, umbra.folder()).paths)
+        title.append(title.back() == ':' ? " " : ", ").append(std::filesystem::path(path).stem().string());
+    const std::string side = std::to_string(picture_side),
+                      subtitle = side + " x " + side + " pixels, threads: " + std::to_string(opt.threads) + ", median of " +
+                                 std::to_string(opt.rounds) + " runs. Numbers at the marks: texels a side of the shadow buffer.";
+    const auto write = [&](const char* name, const std::string& text) {
+        write_bytes(opt.out / name, Bytes(text.begin(), text.end()));
+    };
+    write("report.csv", csv(figures));
+    write("stiffness.csv", csv(stiff));
+    write("report.svg", svg(figures, title, subtitle));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) try {
-    const Options opt = parse(argc, argv);
-    std::filesystem::create_directories(opt.out);
+    const Arguments arguments(argv + 1, argv + argc);
+    const auto given = [&](const char* option) { return std::find(arguments.begin(), arguments.end(), option) != arguments.end(); };
+    if (given("--help")) return std::fputs(usage_text, stdout) < 0;
     const Program umbra(UMBRA_BINARY);
-    using Kind = Configuration::Kind;
-    std::vector<Configuration> configurations;
-    for (const Kind kind : {Kind::map, Kind::constant})
-        for (const int size : sizes) configurations.push_back({kind, size});
-    configurations.push_back({Kind::exact, 0});
-    configurations.push_back({Kind::off, 0});
-
-    std::vector<Figures> figures;
-    for (const Configuration& c : configurations) {
-        std::cerr << "report: errors of " << c.name() << ' ' << (c.size ? std::to_string(c.size) : "") << '\n';
-        figures.push_back(measure_error(umbra, opt, c));
-    }
-    measure_times(umbra, opt, configurations, figures);
-    predict_errors(umbra, opt, configurations, figures);
-    mark_frontier(figures);
-
-    const std::vector<StiffRow> stiff = measure_stiffness(umbra);
-
-    print_table(figures);
-    print_predictions(figures);
-    print_stiffness(stiff);
-    const std::string title = "Shadow error against time: " + joined_names(opt.models);
-    const std::string subtitle = std::to_string(picture_side) + " x " + std::to_string(picture_side) + " pixels, " +
-                                 std::to_string(opt.threads) + (opt.threads == 1 ? " thread" : " threads") +
-                                 ", median of " + std::to_string(opt.rounds) +
-                                 " runs. Numbers at the marks: texels a side of the shadow buffer.";
-    write(opt.out / "report.csv", csv(figures));
-    write(opt.out / "stiffness.csv", csv(stiff));
-    write(opt.out / "report.svg", svg(figures, title, subtitle));
-    return 0;
-} catch (const std::invalid_argument& e) {
-    std::cerr << "report: " << e.what() << " (report --help lists the options)\n";
-    return 2;
+    if (arguments.empty() || given("-o") || given("--rounds")) make_table(umbra, parse(arguments));
+    else std::puts(Judge(umbra, arguments).error().line().c_str());
+    return std::fflush(stdout) != 0;
+} catch (const ProgramFailed& e) {
+    std::cerr << e.what();
+    return e.status;
 } catch (const std::exception& e) {
-    std::cerr << "report: " << e.what() << '\n';
-    return 1;
+    const bool usage = dynamic_cast<const std::invalid_argument*>(&e);
+    std::cerr << "report: " << e.what() << (usage ? " (report --help lists the options)" : "") << '\n';
+    return usage ? 2 : 1;
 }

@@ -21,3 +21,16 @@ std::string report_line(TruthImage truth, const FaceBuffer& faces, const Verdict
                   e.facing ? std::sqrt(squares / (3. * static_cast<double>(e.facing))) : 0.);
     return line;
 }
+
+ShadowError compare(const TruthImage& truth, std::span<const std::uint8_t> lit) {
+    if (lit.size() != truth.pixel.size()) throw std::invalid_argument("verdicts and truth differ in size");
+    ShadowError error;
+    for (std::size_t i = 0; i < lit.size(); i++) {
+        const bool truly_lit = truth.pixel[i] == Truth::lit;
+        if (!truly_lit && truth.pixel[i] != Truth::shadowed) continue;
+        error.facing++;
+        if (truly_lit && !lit[i]) error.falsely_dark++;
+        if (!truly_lit && lit[i]) error.falsely_lit++;
+    }
+    return error;
+}

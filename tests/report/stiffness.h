@@ -8,16 +8,11 @@ struct StiffRow {
     std::string family;   // what grows
     std::string measure;  // what is off, and its unit
     double bearable;      // ... and how much of it is no fault
-    struct Step {
-        double stiffness, error;
-    };
-    std::vector<Step> steps = {};
-
-    const Step* breaks() const;  // the first step beyond what is bearable, null for none
+    double stiffness, error;
 };
 
 // Runs the program on scenes made for it, and computes matrices in float, double and long double.
 std::vector<StiffRow> measure_stiffness(const Program& umbra);
 
-// A line of names, then a line for each step.
+// A line of names, then a line for each.
 std::string csv(const std::vector<StiffRow>& rows);

@@ -82,9 +82,9 @@ vec3 least_axis(const vec3& v) {
     return a.y <= a.x && a.y <= a.z ? vec3{0, 1, 0} : a.x <= a.z ? vec3{1, 0, 0} : vec3{0, 0, 1};
 }
 
-// Runs body(row) for every row, on several threads.
-template <typename Body>
-void for_rows(int height, int threads, const Body& body) {
+}  // namespace
+
+void for_rows(int height, int threads, const std::function<void(int)>& body) {
     std::atomic<int> next{0};
     const auto work = [&] {
         for (int row = next++; row < height; row = next++) body(row);
@@ -97,8 +97,6 @@ void for_rows(int height, int threads, const Body& body) {
     }
     work();
 }
-
-}  // namespace
 
 vec3 View::direction(int px, int py) const {
     const vec3 z = normalized(eye - center);
@@ -535,17 +533,4 @@ TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light,
         }
     });
     return image;
-}
-
-ShadowError compare(const TruthImage& truth, std::span<const std::uint8_t> lit) {
-    if (lit.size() != truth.pixel.size()) throw std::invalid_argument("verdicts and truth differ in size");
-    ShadowError error;
-    for (std::size_t i = 0; i < lit.size(); i++) {
-        const bool truly_lit = truth.pixel[i] == Truth::lit;
-        if (!truly_lit && truth.pixel[i] != Truth::shadowed) continue;
-        error.facing++;
-        if (truly_lit && !lit[i]) error.falsely_dark++;
-        if (!truly_lit && lit[i]) error.falsely_lit++;
-    }
-    return error;
 }

@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -100,23 +101,5 @@ struct TruthImage {
 // the scene to the light and need not be a unit vector. The result does not depend on the number of threads.
 TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light, int threads = 1);
 
-// ---- how far a shadow method is from the truth ----
-
-struct ShadowError {
-    long facing = 0;        // pixels whose surface faces the light: the whole that the percentages are of
-    long falsely_dark = 0;  // of those lit in truth: acne, and half of what a ragged boundary costs
-    long falsely_lit = 0;   // of those shadowed in truth: leaks, and the other half
-
-    double percent() const { return percent_of(falsely_dark + falsely_lit); }
-    double percent_dark() const { return percent_of(falsely_dark); }
-    double percent_lit() const { return percent_of(falsely_lit); }
-
-private:
-    double percent_of(long wrong) const {
-        return facing ? 100. * static_cast<double>(wrong) / static_cast<double>(facing) : 0;
-    }
-};
-
-// Compares a method's verdicts, one for each pixel, row 0 at the bottom, 0 dark and anything else lit. Only those of
-// the facing pixels are looked at. Throws std::invalid_argument where the sizes differ.
-ShadowError compare(const TruthImage& truth, std::span<const std::uint8_t> lit);
+// Calls body(row) for the rows [0,height), on several threads.
+void for_rows(int height, int threads, const std::function<void(int)>& body);

@@ -651,26 +651,6 @@ TEST("meaningless input is refused") {
     CHECK_THROWS(cast(caster, {{1, 2, nan}, {}, {0, 1, 0}, 4, 4}, {1, 1, 0}, 2), "view");
     CHECK_THROWS(cast(caster, {{1, 1, 4}, {}, {0, 1, 0}, 0, 4}, {1, 1, 0}, 2), "pixels");
     CHECK_THROWS(cast(caster, {}, {0, 0, 0}, 2), "light");
-    CHECK_THROWS(compare(TruthImage{1, 1, {Truth::lit}, {0}}, std::vector<std::uint8_t>(2)), "size");
 }
 
-// ---- the error figures ----
-
-TEST("the share of wrong pixels is counted over those that face the light") {
-    const std::vector<Truth> pixel = {Truth::background, Truth::away, Truth::lit,      Truth::lit,
-                                      Truth::lit,        Truth::lit,  Truth::shadowed, Truth::shadowed};
-    const TruthImage truth{4, 2, pixel, {-1, 0, 0, 0, 0, 0, 0, 0}};
-    const ShadowError some = compare(truth, std::vector<std::uint8_t>{1, 1, 1, 0, 255, 1, 0, 1});
-    CHECK_EQ(some.facing, 6);
-    CHECK_EQ(some.falsely_dark, 1);
-    CHECK_EQ(some.falsely_lit, 1);
-    CHECK_NEAR(some.percent(), 100 / 3., 1e-12);
-    CHECK_NEAR(some.percent_dark(), 100 / 6., 1e-12);
-    const ShadowError none = compare(truth, std::vector<std::uint8_t>{0, 1, 1, 1, 1, 1, 0, 0});
-    CHECK_EQ(none.percent(), 0);
-    const ShadowError all = compare(truth, std::vector<std::uint8_t>{0, 1, 0, 0, 0, 0, 1, 1});
-    CHECK_EQ(all.percent(), 100);
-    CHECK_EQ(all.percent_lit(), 100 / 3.);
-    CHECK_EQ(compare(TruthImage{1, 1, {Truth::away}, {0}}, std::vector<std::uint8_t>{1}).percent(), 0);
-}
 int main(int argc, char** argv) { return run_tests(argc, argv); }

@@ -1,0 +1,106 @@
+// judge.cpp: see judge.h.
+#include "judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <thread>
+
+// The same faces in the same order.
+static void write_copy(const std::filesystem::path& path, const Model& model, const vec3& n) {
+    std::ofstream out(path);
+    out.precision(17);  // gives the same double back
+    out << "vn " << n.x << ' ' << n.y << ' ' << n.z << '\n';
+    for (int face = 0; face < model.nfaces(); face++) {
+        for (int c = 0; c < 3; c++)
+            out << "v " << model.vert(face, c).x << ' ' << model.vert(face, c).y << ' ' << model.vert(face, c).z << '\n';
+        out << "f -3//1 -2//1 -1//1\n";
+    }
+    if (!out.flush()) throw std::runtime_error(path.string() + ": cannot write");
+}
+
+Scene::Scene(const Arguments& arguments, const TemporaryFolder& folder)
+    : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
+    const auto vector = [](vec3& v) {
+        return [&v](const char* s) { std::sscanf(s, "%lf,%lf,%lf", &v.x, &v.y, &v.z); };
+    };
+    const auto other = [](const char*) {};
+    const std::map<std::string, std::function<void(const char*)>> with_value = {
+        {"--size", [&](const char* s) { std::sscanf(s, "%dx%d", &view.width, &view.height); }},
+        {"--threads", [&](const char* s) { threads = std::atoi(s); }},
+        {"--eye", vector(view.eye)}, {"--center", vector(view.center)}, {"--up", vector(view.up)}, {"--light", vector(light)},
+        {"-o", other}, {"--shadow-size", other}, {"--shadow", other}, {"--bias", other}, {"--draw", other}};
+    bool fit = true;
+    for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
+        const auto option = with_value.find(*arg);
+        const bool is_path = option == with_value.end() && (arg->size() < 2 || arg->front() != '-');
+        (is_path ? paths : towards_light).push_back(*arg);
+        if (*arg == "--no-fit") fit = false;
+        if (option == with_value.end()) continue;
+        option->second((++arg)->c_str());
+        towards_light.push_back(*arg);
+    }
+    if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
+    for (const std::string& path : paths) {
+        Model& model = models.emplace_back(path);
+        towards_light.push_back((folder / ("copy" + std::to_string(models.size()) + ".obj")).string());
+        write_copy(towards_light.back(), model, normalized(light));
+        if (fit) model.fit();
+        model.move(-view.center);
+    }
+    view.eye = view.eye - view.center;
+    view.center = {};
+}
+
+std::string PictureError::line() const {
+    char text[300];
+    std::snprintf(text, sizeof text,
+                  "coverage %ld facing %ld falsely_dark %ld falsely_dark_percent %.4f falsely_lit %ld falsely_lit_percent %.4f "
+                  "error_percent %.4f rmse %.4f",
+                  coverage, facing, falsely_dark, percent(falsely_dark), falsely_lit, percent(falsely_lit), percent(), rmse);
+    return text;
+}
+
+PictureError compare(const TruthImage& truth, const TGAImage& picture, const TGAImage& shadow, const TGAImage& exact) {
+    for (const TGAImage* image : {&picture, &shadow, &exact})
+        if (image->width() != truth.width || image->height() != truth.height)
+            throw std::invalid_argument("picture and truth differ in size");
+    PictureError error;
+    double squares = 0;
+    for (int y = 0; y < truth.height; y++)
+        for (int x = 0; x < truth.width; x++) {
+            const Truth t = truth.pixel[y * truth.width + x];
+            const std::uint8_t *const p = picture.pixel(x, y), *const e = exact.pixel(x, y);
+            const bool covered = p[0] || p[1] || p[2];  // every surface has an ambient 20
+            if ((t != Truth::background) != covered) error.coverage++;
+            else if (t == Truth::lit || t == Truth::shadowed) {
+                const bool lit = *shadow.pixel(x, y) == 255;
+                error.facing++;
+                error.falsely_dark += t == Truth::lit && !lit;
+                error.falsely_lit += t == Truth::shadowed && lit;
+                for (int c = 0; c < 3; c++) squares += (p[c] - e[c]) * (p[c] - e[c]);
+            }
+        }
+    if (error.facing) error.rmse = std::sqrt(squares / (3. * static_cast<double>(error.facing)));
+    return error;
+}
+
+TGAImage Judge::draw(const Arguments& arguments, const Arguments& more) const {
+    program_.run(joined(joined(arguments, more), {"--quiet"}));
+    return TGAImage::read_tga_file(program_.folder() / "framebuffer.tga");
+}
+
+PictureError Judge::error(const Arguments& method) {
+    const TGAImage picture = draw(joined(arguments_, method), {"--draw", "color"});
+    if (!scene_) {
+        scene_.emplace(arguments_, program_.folder());
+        truth_ = cast(RayCaster(scene_->models), scene_->view, scene_->light, scene_->threads);
+        Arguments exact = arguments_;
+        for (auto bias = exact.end(); (bias = std::find(exact.begin(), exact.end(), "--bias")) != exact.end();)
+            exact.erase(bias, bias + 2);
+        exact_ = draw(exact, {"--shadow", "exact", "--draw", "color"});
+    }
+    // What shadows what does not depend on the normals. Where they all point to the light, no pixel is grey.
+    return compare(truth_, picture, draw(joined(scene_->towards_light, method), {"--draw", "shadow"}), exact_);
+}
