@@ -1,15 +1,15 @@
 // truth.cpp: exact arithmetic, the meeting of a ray and a triangle, the bounding volume hierarchy, and what is made of
-// them: the true picture of visibility and shadow, and the figures that say how far a shadow method is from it.
+// them: the true picture of visibility and shadow.
 #include "truth.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
-#include <utility>
 
 namespace {
 
@@ -21,15 +21,9 @@ constexpr double u = std::numeric_limits<double>::epsilon() / 2;  // the largest
 // (1997).
 class Exact {
 public:
-    Exact(double value = 0) {
-        if (value != 0) parts_.push_back(value);
-    }
+    Exact(double value = 0) { add(value); }
     int sign() const { return parts_.empty() ? 0 : parts_.back() > 0 ? 1 : -1; }
-    double rounded() const {
-        double sum = 0;
-        for (const double part : parts_) sum += part;
-        return sum;
-    }
+    double rounded() const { return std::accumulate(parts_.begin(), parts_.end(), 0.); }
     Exact& operator+=(const Exact& b) {
         for (const double part : b.parts_) add(part);
         return *this;
@@ -38,19 +32,19 @@ public:
         for (const double part : b.parts_) add(-part);
         return *this;
     }
-    friend Exact operator+(Exact a, const Exact& b) { return a += b; }
-    friend Exact operator-(Exact a, const Exact& b) { return a -= b; }
-    friend Exact operator*(const Exact& a, const Exact& b) {
+    Exact& operator*=(const Exact& b) {
         Exact product;
-        for (const double x : a.parts_)
+        for (const double x : parts_)
             for (const double y : b.parts_) {
                 const double p = x * y;
                 product.add(std::fma(x, y, -p));  // what p lost
                 product.add(p);
             }
-        return product;
+        return *this = product;
     }
-    Exact& operator*=(const Exact& b) { return *this = *this * b; }
+    friend Exact operator+(Exact a, const Exact& b) { return a += b; }
+    friend Exact operator-(Exact a, const Exact& b) { return a -= b; }
+    friend Exact operator*(Exact a, const Exact& b) { return a *= b; }
 
 private:
     void add(double b) {  // Shewchuk's Grow-Expansion, zeros left out
@@ -132,8 +126,7 @@ struct RayCaster::Ray {
         const vec3 edge1 = from[1] - from[0], edge2 = from[2] - from[0];
         offset = (edge1 * w.y + edge2 * w.z) / sum;
 
-        const vec3 a{std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)};
-        kz = a.x > a.y ? (a.x > a.z ? 0 : 2) : (a.y > a.z ? 1 : 2);
+        kz = std::fabs(d.x) == largest(d) ? 0 : std::fabs(d.y) == largest(d) ? 1 : 2;
         kx = (kz + 1) % 3;
         ky = (kx + 1) % 3;
         shear_x = d[kx] / d[kz];
@@ -161,13 +154,24 @@ struct RayCaster::Ray {
             per_direction[i] = std::fabs(d[i]) > 1e-200 ? 1 / d[i] : 1e200;
         }
     }
+};
 
-    // A vertex in the moved scene, times the sum of the weights, without rounding.
-    Exact3 moved(const vec3& v) const {
-        const Exact3 base = exact(start[0]);
-        return (exact(v) - base) * (Exact(weight.x) + weight.y + weight.z) - (exact(start[1]) - base) * weight.y -
-               (exact(start[2]) - base) * weight.z;
+// The corners of a triangle in the moved scene, times the sum of the weights, and what they span: without rounding.
+struct RayCaster::ExactTriangle {
+    Exact3 direction, corner[3];
+    double sum;
+
+    ExactTriangle(const Ray& ray, const Triangle& triangle)
+        : direction(exact(ray.direction)), sum(ray.weight.x + ray.weight.y + ray.weight.z) {
+        const Exact3 base = exact(ray.start[0]);
+        for (int i = 0; i < 3; i++)
+            corner[i] = (exact(triangle[i]) - base) * (Exact(ray.weight.x) + ray.weight.y + ray.weight.z) -
+                        (exact(ray.start[1]) - base) * ray.weight.y - (exact(ray.start[2]) - base) * ray.weight.z;
     }
+    // The determinant with the direction, opposite the corner i: unsheared, the area of the meeting times the direction.
+    Exact area(int i) const { return dot(direction, cross(corner[(i + 1) % 3], corner[(i + 2) % 3])); }
+    // The determinant of the corners; the shear leaves it as it is.
+    Exact volume() const { return dot(corner[0], cross(corner[1], corner[2])); }
 };
 
 // Where the line of a ray meets a triangle, if it does.
@@ -181,7 +185,7 @@ struct RayCaster::Meeting {
     Meeting(const Ray& ray, const Triangle& triangle) {
         double x[3], y[3], z[3], size = 0, depth = 0;
         for (int i = 0; i < 3; i++) {
-            const vec3 moved = (triangle[static_cast<std::size_t>(i)] - ray.start[0]) - ray.offset;
+            const vec3 moved = (triangle[i] - ray.start[0]) - ray.offset;
             z[i] = moved[ray.kz];
             x[i] = moved[ray.kx] - ray.shear_x * z[i];
             y[i] = moved[ray.ky] - ray.shear_y * z[i];
@@ -196,8 +200,9 @@ struct RayCaster::Meeting {
         const double lowest = std::min({area.x, area.y, area.z}), highest = std::max({area.x, area.y, area.z});
         if (lowest < -area_error && highest > area_error) return;
         if (lowest <= area_error && highest >= -area_error) {  // too close to call
-            for (int i = 0; i < 3; i++)
-                if (std::fabs(area[i]) <= area_error) area[i] = exact_area(ray, triangle, i);
+            const ExactTriangle e(ray, triangle);
+            for (int i = 0; i < 3; i++)  // exact but for the last step: the rounding of a value with the right sign
+                if (std::fabs(area[i]) <= area_error) area[i] = e.area(i).rounded() * ray.per_z / (e.sum * e.sum);
             const bool left = area.x > 0 || area.y > 0 || area.z > 0, right = area.x < 0 || area.y < 0 || area.z < 0;
             if (left == right) return;  // outside; or all are 0: the triangle is seen edge-on or has no area
         }
@@ -210,7 +215,10 @@ struct RayCaster::Meeting {
         // rounding, at most 4u |sum| m, is well within the second error below.
         double volume = area.x * z[0] + area.y * z[1] + area.z * z[2];
         const double volume_error = 3 * area_error * (depth + ray.error) + 2 * std::fabs(sum) * ray.error;
-        if (std::fabs(volume) <= volume_error) volume = exact_volume(ray, triangle);
+        if (std::fabs(volume) <= volume_error) {
+            const ExactTriangle e(ray, triangle);
+            volume = e.volume().rounded() / (e.sum * e.sum * e.sum);
+        }
         in_front = sign(volume) * sign(sum) * sign(ray.per_z) > 0;
         // The sum is off by 3 area_error and its own rounding, less than one more; the steps after it add 4u.
         t = volume / sum * ray.per_z;
@@ -221,151 +229,49 @@ struct RayCaster::Meeting {
                       : infinity;
     }
 
-    // The area opposite the corner i. Unsheared it is the determinant with the direction, which is exact up to its last
-    // step, the rounding of a value with the right sign.
-    static double exact_area(const Ray& ray, const Triangle& triangle, int i) {
-        const Exact3 a = ray.moved(triangle[static_cast<std::size_t>((i + 1) % 3)]);
-        const Exact3 b = ray.moved(triangle[static_cast<std::size_t>((i + 2) % 3)]);
-        const double sum = ray.weight.x + ray.weight.y + ray.weight.z;
-        return dot(exact(ray.direction), cross(a, b)).rounded() * ray.per_z / (sum * sum);
-    }
-
-    // The determinant of the three corners, likewise; the shear leaves it as it is.
-    static double exact_volume(const Ray& ray, const Triangle& triangle) {
-        const Exact3 a = ray.moved(triangle[0]), b = ray.moved(triangle[1]), c = ray.moved(triangle[2]);
-        const double sum = ray.weight.x + ray.weight.y + ray.weight.z;
-        return dot(a, cross(b, c)).rounded() / (sum * sum * sum);
-    }
-
     // Whether the ray meets the triangle a before (-1), together with (0) or after (1) the triangle b: the quotients
-    // volume / sum compared by cross-multiplication.
+    // volume / sum of the areas compared by cross-multiplication.
     static int exact_order(const Ray& ray, const Triangle& a, const Triangle& b) {
-        const auto quotient = [&](const Triangle& triangle) {
-            const Exact3 p = ray.moved(triangle[0]), q = ray.moved(triangle[1]), r = ray.moved(triangle[2]);
-            return std::pair{dot(p, cross(q, r)), dot(exact(ray.direction), cross(q - p, r - p))};
-        };
-        const auto [volume_a, sum_a] = quotient(a);
-        const auto [volume_b, sum_b] = quotient(b);
-        return (volume_a * sum_b - volume_b * sum_a).sign() * sum_a.sign() * sum_b.sign();
+        const ExactTriangle p(ray, a), q(ray, b);
+        const Exact sum_p = p.area(0) + p.area(1) + p.area(2), sum_q = q.area(0) + q.area(1) + q.area(2);
+        return (p.volume() * sum_q - q.volume() * sum_p).sign() * sum_p.sign() * sum_q.sign();
     }
 };
 
 // ---- the hierarchy ----
 
-// Splits by the surface area heuristic: a ray meets a box inside another with the probability of the quotient of their
-// surfaces, so a split is as good as the sum of surface times triangles on both sides is small (MacDonald, Booth 1990).
-struct RayCaster::Builder {
-    static constexpr int nbins = 16, leaf_size = 4;
-    static constexpr int heuristic_depth = 40;  // from here on in halves: no more than 31 levels for 2^31 triangles
-    static constexpr int max_depth = heuristic_depth + 32;
-
-    struct Box {
-        vec3 low{infinity, infinity, infinity}, high{-infinity, -infinity, -infinity};
-        void add(const vec3& p) {
-            low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-            high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-        }
-        void add(const Box& b) {
-            add(b.low);
-            add(b.high);
-        }
-        double half_surface() const {
-            const vec3 d = high - low;
-            return d.x * d.y + d.y * d.z + d.z * d.x;
-        }
+// Halves of as many triangles, so there are no more than 31 levels for 2^31 of them.
+void RayCaster::build(int node, int begin, int end) {
+    Node box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}, begin, end - begin, 0};
+    for (int i = begin; i < end; i++)
+        for (const vec3& v : triangles_[order_[i]])
+            for (int k = 0; k < 3; k++) box.low[k] = std::min(box.low[k], v[k]), box.high[k] = std::max(box.high[k], v[k]);
+    const vec3 side = box.high - box.low;
+    const int axis = box.axis = side.x == largest(side) ? 0 : side.y == largest(side) ? 1 : 2;
+    nodes_[node] = box;
+    if (end - begin <= 4) return;
+    const int middle = begin + (end - begin) / 2, children = static_cast<int>(nodes_.size());
+    const auto place = [&](int triangle) {
+        const Triangle& t = triangles_[triangle];
+        return t[0][axis] + t[1][axis] + t[2][axis];
     };
-    struct Item {
-        Box box;
-        vec3 centre;
-        int number;
-    };
-    struct Split {
-        int axis = -1;
-        double at = 0, cost = infinity;
-    };
+    std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
+                     [&](int a, int b) { return place(a) < place(b); });
+    nodes_[node].first = children, nodes_[node].count = 0;
+    nodes_.resize(nodes_.size() + 2);
+    build(children, begin, middle);
+    build(children + 1, middle, end);
+}
 
-    std::vector<Item> items;
-    std::vector<Node>& nodes;
-
-    Builder(const std::vector<Triangle>& triangles, std::vector<Node>& out) : nodes(out) {
-        items.reserve(triangles.size());
-        for (const Triangle& triangle : triangles) {
-            Item item{{}, {}, static_cast<int>(items.size())};
-            for (const vec3& v : triangle) item.box.add(v);
-            item.centre = item.box.low * .5 + item.box.high * .5;
-            items.push_back(item);
-        }
-        nodes.reserve(triangles.size());
-        nodes.emplace_back();
-        build(0, 0, static_cast<int>(items.size()), 0);
-    }
-
-    Item* at(int i) { return items.data() + i; }
-
-    Split best_split(int begin, int end, const Box& centres) {
-        Split best;
-        for (int axis = 0; axis < 3; axis++) {
-            const double low = centres.low[axis], width = centres.high[axis] - low;
-            if (!(width > 0)) continue;
-            Box boxes[nbins], right_boxes[nbins];
-            int counts[nbins] = {};
-            for (const Item* item = at(begin); item != at(end); item++) {
-                const int bin = std::min(nbins - 1, static_cast<int>((item->centre[axis] - low) / width * nbins));
-                boxes[bin].add(item->box);
-                counts[bin]++;
-            }
-            right_boxes[nbins - 1] = boxes[nbins - 1];
-            for (int i = nbins - 2; i > 0; i--) {
-                right_boxes[i] = right_boxes[i + 1];
-                right_boxes[i].add(boxes[i]);
-            }
-            Box left;
-            for (int i = 1, n = 0; i < nbins; i++) {
-                left.add(boxes[i - 1]);
-                n += counts[i - 1];
-                if (n == 0 || n == end - begin) continue;
-                const double cost = left.half_surface() * n + right_boxes[i].half_surface() * (end - begin - n);
-                if (cost < best.cost) best = {axis, low + width * i / nbins, cost};
-            }
-        }
-        return best;
-    }
-
-    void build(int node, int begin, int end, int depth) {
-        Box box, centres;
-        for (const Item* item = at(begin); item != at(end); item++) {
-            box.add(item->box);
-            centres.add(item->centre);
-        }
-        nodes[static_cast<std::size_t>(node)] = {box.low, box.high, begin, end - begin};
-        if (end - begin <= leaf_size) return;
-
-        Item* middle = at(begin);
-        if (depth < heuristic_depth) {
-            const Split split = best_split(begin, end, centres);
-            if (split.axis >= 0)
-                middle =
-                    std::partition(at(begin), at(end), [&](const Item& i) { return i.centre[split.axis] < split.at; });
-        }
-        if (middle == at(begin) || middle == at(end)) middle = at(begin + (end - begin) / 2);
-
-        const int children = static_cast<int>(nodes.size());
-        nodes.resize(nodes.size() + 2);
-        nodes[static_cast<std::size_t>(node)].first = children;
-        nodes[static_cast<std::size_t>(node)].count = 0;
-        const int cut = static_cast<int>(middle - at(0));
-        build(children, begin, cut, depth + 1);
-        build(children + 1, cut, end, depth + 1);
-    }
-};
-
-// Calls visit(position) for every triangle whose box the ray meets within the limit, nearer boxes first. `visit`
-// returns the new limit, below 0 to stop.
+// Calls visit(number) for every triangle whose box the ray meets within the limit, nearer boxes first. `visit` returns the
+// new limit, below 0 to stop.
 template <typename Visit>
 void RayCaster::traverse(const Ray& ray, Visit visit) const {
     double limit = infinity;
-    const auto entry = [&](const Node& node) {  // infinity for a box that is missed
-        double near = 0, far = infinity;
+    int stack[64] = {}, n = 1;
+    while (n > 0) {
+        const Node& node = nodes_[stack[--n]];
+        double near = 0, far = limit;
         for (int i = 0; i < 3; i++) {
             const bool forward = ray.per_direction[i] > 0;
             const double in = forward ? node.low[i] - ray.origin_high[i] : node.high[i] - ray.origin_low[i];
@@ -373,123 +279,77 @@ void RayCaster::traverse(const Ray& ray, Visit visit) const {
             near = std::max(near, in * ray.per_direction[i]);
             far = std::min(far, out * ray.per_direction[i]);
         }
-        return near <= far * (1 + 16 * u) ? near : infinity;  // each is off by 3u: difference, reciprocal, product
-    };
-    struct Waiting {
-        int node;
-        double near;
-    };
-    std::array<Waiting, Builder::max_depth + 2> stack;
-    std::size_t n = 0;
-    const auto push = [&](int node, double near) {
-        if (near < infinity) stack[n++] = {node, near};
-    };
-    push(0, entry(nodes_[0]));
-    while (n > 0) {
-        const Waiting next = stack[--n];
-        if (next.near > limit * (1 + 16 * u)) continue;
-        const Node& node = nodes_[static_cast<std::size_t>(next.node)];
+        if (!(near <= far * (1 + 16 * u))) continue;  // each is off by 3u: difference, reciprocal, product
         for (int i = node.first; i < node.first + node.count; i++)
-            if ((limit = visit(i)) < 0) return;
+            if ((limit = visit(order_[i])) < 0) return;
         if (node.count > 0) continue;
-        const double near0 = entry(nodes_[static_cast<std::size_t>(node.first)]);
-        const double near1 = entry(nodes_[static_cast<std::size_t>(node.first) + 1]);
-        if (near0 > near1) {
-            push(node.first, near0);
-            push(node.first + 1, near1);
-        } else {
-            push(node.first + 1, near1);
-            push(node.first, near0);
-        }
+        const int forward = ray.direction[node.axis] > 0;
+        stack[n++] = node.first + forward;
+        stack[n++] = node.first + 1 - forward;
     }
 }
 
-namespace {
+RayCaster::RayCaster(std::span<const Model> models)
+    : RayCaster([&] {
+          std::vector<Triangle> triangles;
+          for (const Model& model : models)
+              for (int face = 0; face < model.nfaces(); face++)
+                  triangles.push_back({model.vert(face, 0), model.vert(face, 1), model.vert(face, 2)});
+          return triangles;
+      }()) {}
 
-std::vector<Triangle> triangles_of(std::span<const Model> models) {
-    std::vector<Triangle> triangles;
-    for (const Model& model : models)
-        for (int face = 0; face < model.nfaces(); face++)
-            triangles.push_back({model.vert(face, 0), model.vert(face, 1), model.vert(face, 2)});
-    return triangles;
-}
-
-}  // namespace
-
-RayCaster::RayCaster(std::span<const Model> models) : RayCaster(triangles_of(models)) {}
-
-RayCaster::RayCaster(std::vector<Triangle> triangles) {
-    for (const Triangle& triangle : triangles)
+RayCaster::RayCaster(std::vector<Triangle> triangles) : triangles_(std::move(triangles)), order_(triangles_.size()) {
+    for (const Triangle& triangle : triangles_)
         for (const vec3& v : triangle)
-            for (int i = 0; i < 3; i++)
-                if (!(std::fabs(v[i]) <= 1e40))
-                    throw std::runtime_error("the truth is known up to 1e40, and a coordinate is not finite or beyond");
-    if (triangles.empty()) return;
-    const Builder builder(triangles, nodes_);
-    position_.resize(triangles.size());
-    for (const auto& item : builder.items) {
-        position_[static_cast<std::size_t>(item.number)] = static_cast<int>(triangles_.size());
-        number_.push_back(item.number);
-        triangles_.push_back(triangles[static_cast<std::size_t>(item.number)]);
-    }
+            if (!(std::fabs(v.x) <= 1e40 && std::fabs(v.y) <= 1e40 && std::fabs(v.z) <= 1e40))
+                throw std::runtime_error("the truth is known up to 1e40, and a coordinate is not finite or beyond");
+    std::iota(order_.begin(), order_.end(), 0);
+    nodes_.resize(1);
+    build(0, 0, ntriangles());
 }
 
 std::optional<Hit> RayCaster::first_hit(const vec3& origin, const vec3& direction) const {
-    if (nodes_.empty()) return {};
+    if (triangles_.empty()) return {};
     const Ray ray({origin, origin, origin}, {1, 0, 0}, direction, nodes_[0]);
     std::optional<Meeting> best;
-    int best_position = -1;
-    traverse(ray, [&](int position) {
-        const Triangle& triangle = triangles_[static_cast<std::size_t>(position)];
-        const Meeting meeting(ray, triangle);
+    int nearest = -1;
+    traverse(ray, [&](int number) {
+        const Meeting meeting(ray, triangles_[number]);
         if (meeting.meets && meeting.in_front) {
             bool nearer = !best || meeting.t < best->t;
             if (best && std::fabs(meeting.t - best->t) <= meeting.t_error + best->t_error) {  // too close to call
-                const int order =
-                    Meeting::exact_order(ray, triangle, triangles_[static_cast<std::size_t>(best_position)]);
-                if (order != 0) nearer = order < 0;
-                else if (meeting.front_seen != best->front_seen) nearer = meeting.front_seen;
-                else
-                    nearer =
-                        number_[static_cast<std::size_t>(position)] < number_[static_cast<std::size_t>(best_position)];
+                const int order = Meeting::exact_order(ray, triangles_[number], triangles_[nearest]);
+                nearer = order != 0 ? order < 0 : meeting.front_seen != best->front_seen ? meeting.front_seen : number < nearest;
             }
-            if (nearer) {
-                best = meeting;
-                best_position = position;
-            }
+            if (nearer) best = meeting, nearest = number;
         }
         return best ? best->t + best->t_error : infinity;
     });
     if (!best) return {};
     const vec3 w = best->weight / (best->weight.x + best->weight.y + best->weight.z);
-    const Triangle& v = triangles_[static_cast<std::size_t>(best_position)];
-    return Hit{number_[static_cast<std::size_t>(best_position)], best->t, v[0] * w.x + v[1] * w.y + v[2] * w.z, w};
+    const Triangle& v = triangles_[nearest];
+    return Hit{nearest, best->t, v[0] * w.x + v[1] * w.y + v[2] * w.z, w};
 }
 
-bool RayCaster::occluded(int triangle, const vec3& weight, const vec3& direction) const {
-    const int own = position_[static_cast<std::size_t>(triangle)];
-    const Ray ray(triangles_[static_cast<std::size_t>(own)], weight, direction, nodes_[0]);
+// The own triangle would be found at t = 0, but only by exact arithmetic.
+bool RayCaster::blocked(const Ray& ray, int own, double beyond) const {
     bool found = false;
-    traverse(ray, [&](int position) {
-        if (position != own) {  // it would be found at t = 0, but only by exact arithmetic
-            const Meeting meeting(ray, triangles_[static_cast<std::size_t>(position)]);
-            found = meeting.meets && meeting.in_front;
+    traverse(ray, [&](int number) {
+        if (number != own) {
+            const Meeting meeting(ray, triangles_[number]);
+            found = meeting.meets && meeting.in_front && meeting.t > beyond;
         }
         return found ? -1 : infinity;
     });
     return found;
 }
 
+bool RayCaster::occluded(int triangle, const vec3& weight, const vec3& direction) const {
+    return blocked(Ray(triangles_[triangle], weight, direction, nodes_[0]), triangle, -infinity);
+}
+
 bool RayCaster::occluded(const vec3& origin, const vec3& direction, double beyond) const {
-    if (nodes_.empty()) return false;
-    const Ray ray({origin, origin, origin}, {1, 0, 0}, direction, nodes_[0]);
-    bool found = false;
-    traverse(ray, [&](int position) {
-        const Meeting meeting(ray, triangles_[static_cast<std::size_t>(position)]);
-        found = meeting.meets && meeting.in_front && meeting.t > beyond;
-        return found ? -1 : infinity;
-    });
-    return found;
+    return !triangles_.empty() && blocked(Ray({origin, origin, origin}, {1, 0, 0}, direction, nodes_[0]), -1, beyond);
 }
 
 bool RayCaster::faces(int number, const vec3& direction) const {
@@ -502,30 +362,20 @@ bool RayCaster::faces(int number, const vec3& direction) const {
     return dot(cross(exact(v[1]) - exact(v[0]), exact(v[2]) - exact(v[0])), exact(direction)).sign() > 0;
 }
 
-// ---- pictures and figures ----
-
-namespace {
-
-// Refuses what would make every ray meaningless; what is left cannot throw in a thread.
-void check_view(const View& view, const vec3& to_light) {
-    if (view.width < 1 || view.height < 1) throw std::invalid_argument("a picture without pixels");
-    (void)view.direction(0, 0);
-    if (!(largest(to_light) > 0 && std::isfinite(largest(to_light))))
-        throw std::invalid_argument("a light without a direction");
-}
-
-}  // namespace
+// ---- pictures ----
 
 TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light, int threads) {
-    check_view(view, to_light);
-    const std::size_t width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height);
-    TruthImage image{view.width, view.height, std::vector<Truth>(width * height, Truth::background),
-                     std::vector<int>(width * height, -1)};
+    // Refused is what would make every ray meaningless; what is left cannot throw in a thread.
+    if (view.width < 1 || view.height < 1) throw std::invalid_argument("a picture without pixels");
+    (void)view.direction(0, 0);
+    if (!(largest(to_light) > 0 && std::isfinite(largest(to_light)))) throw std::invalid_argument("a light without a direction");
+    const std::size_t pixels = static_cast<std::size_t>(view.width) * view.height;
+    TruthImage image{view.width, view.height, std::vector<Truth>(pixels, Truth::background), std::vector<int>(pixels, -1)};
     for_rows(view.height, threads, [&](int y) {
         for (int x = 0; x < view.width; x++) {
             const auto hit = caster.first_hit(view.eye, view.direction(x, y));
             if (!hit) continue;
-            const std::size_t i = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+            const std::size_t i = static_cast<std::size_t>(y) * view.width + x;
             image.triangle[i] = hit->triangle;
             image.pixel[i] = !caster.faces(hit->triangle, to_light)                  ? Truth::away
                              : caster.occluded(hit->triangle, hit->weight, to_light) ? Truth::shadowed

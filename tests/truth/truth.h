@@ -46,9 +46,7 @@ public:
     explicit RayCaster(std::vector<Triangle> triangles);
 
     int ntriangles() const { return static_cast<int>(triangles_.size()); }
-    const Triangle& triangle(int number) const {
-        return triangles_[static_cast<std::size_t>(position_[static_cast<std::size_t>(number)])];
-    }
+    const Triangle& triangle(int number) const { return triangles_[number]; }
 
     // The nearest triangle in front of the origin, seen from either side; its edges and corners belong to it, and one
     // that is seen edge-on is not there. Of several at exactly the same distance the one whose front is seen, then the
@@ -67,21 +65,22 @@ public:
     bool faces(int triangle, const vec3& direction) const;
 
 private:
-    struct Node {  // a leaf holds triangles_[first, first+count); an inner node, count 0, the nodes first and first+1
+    struct Node {  // a leaf holds the triangles order_[first, first+count); an inner node, count 0, nodes first and first+1
         vec3 low, high;
-        int first, count;
+        int first, count, axis;  // of which the first has the smaller coordinates along the axis
     };
     struct Ray;
+    struct ExactTriangle;
     struct Meeting;
-    struct Builder;
 
+    void build(int node, int begin, int end);
     template <typename Visit>
     void traverse(const Ray& ray, Visit visit) const;
+    bool blocked(const Ray& ray, int own, double beyond) const;
 
-    std::vector<Triangle> triangles_;  // in the order of the leaves
-    std::vector<int> number_;          // of the triangle at a position
-    std::vector<int> position_;        // of the triangle with a number
-    std::vector<Node> nodes_;          // the root first; empty without triangles
+    std::vector<Triangle> triangles_;
+    std::vector<int> order_;   // their numbers, leaf after leaf
+    std::vector<Node> nodes_;  // the root first
 };
 
 enum class Truth : std::uint8_t {
