@@ -5,7 +5,8 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
-#include <map>
+#include <cstring>
+#include <iterator>
 #include <stdexcept>
 
 namespace {
@@ -20,12 +21,8 @@ namespace {
 }
 
 std::string escaped(const std::string& text) {
-    static const std::map<char, std::string> entities{{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}};
     std::string out;
-    for (const char c : text) {
-        const auto entity = entities.find(c);
-        out += entity != entities.end() ? entity->second : std::string(1, static_cast<unsigned char>(c) < ' ' ? ' ' : c);
-    }
+    for (const char c : text) out += std::strchr("&<>\"'", c) ? format("&#%d;", c ? c : ' ') : std::string(1, c);
     return out;
 }
 
@@ -60,45 +57,6 @@ struct Place {
     double x, y;
 };
 
-// Finds each label a place beside its mark that nothing else has, or the one that covers least.
-class Labels {
-public:
-    void keep_clear(const Place& a, const Place& b, double r) {  // a line, r to either side
-        const int n = static_cast<int>(std::hypot(b.x - a.x, b.y - a.y) / 3) + 1;
-        for (int i = 0; i <= n; i++) {
-            const double x = a.x + (b.x - a.x) * i / n, y = a.y + (b.y - a.y) * i / n;
-            taken_.push_back({x - r, y - r, x + r, y + r});
-        }
-    }
-    // The text's left end on its base line. side: -1 to prefer the left of the mark, 1 the right.
-    Place place(const Place& mark, const std::string& text, double font, int side) {
-        const double w = .66 * font * static_cast<double>(text.size()), h = font;  // of a wide sans-serif
-        Box best{};
-        double least = INFINITY;
-        for (const double away : {14., 19., 25., 32.})
-            for (const double turn : {0., 30., -30., 60., -60., 90., -90., 180., 150., -150., 120., -120.}) {
-                const double angle = turn * 3.14159265 / 180;
-                // The box's middle: as far from the mark as to leave it `away` of room.
-                const double x = mark.x + side * std::cos(angle) * (away + w / 2), y = mark.y - std::sin(angle) * (away + h / 2);
-                const Box box{x - w / 2, y - h / 2, x + w / 2, y + h / 2};
-                if (box.x0 < left + 4 || box.x1 > right - 2 || box.y0 < top - 14 || box.y1 > bottom - 4) continue;
-                double covered = away / 100;  // of two free places the nearer
-                for (const Box& other : taken_)
-                    covered += std::max(0., std::min(box.x1 + 2, other.x1) - std::max(box.x0 - 2, other.x0)) *
-                               std::max(0., std::min(box.y1 + 1, other.y1) - std::max(box.y0 - 1, other.y0));
-                if (covered < least) least = covered, best = box;
-            }
-        taken_.push_back(best);
-        return {best.x0, best.y1 - .22 * h};
-    }
-
-private:
-    struct Box {
-        double x0, y0, x1, y1;
-    };
-    std::vector<Box> taken_;
-};
-
 // A method's look: told apart by shape and dashes as well, for print without colour and for every eye.
 constexpr int looks = 4;
 constexpr const char* dashes[looks] = {"none", "7 4", "2 3", "10 3 2 3"};
@@ -109,7 +67,7 @@ std::string text(const Place& p, const std::string& kind, const std::string& wha
     return format("<text x='%.1f' y='%.1f' class='%s'>", p.x, p.y, kind.c_str()) + escaped(what) + "</text>\n";
 }
 std::string path(const char* kind, const std::string& d) { return format("<path class='%s' d='", kind) + d + "'/>\n"; }
-std::string line_to(const Place& p) { return format(" %.1f %.1f", p.x, p.y); }
+std::string coordinates(const Place& p) { return format(" %.1f %.1f", p.x, p.y); }
 
 // Dark on light, and light on dark where the reader's screen is dark; on paper always the former. No custom properties:
 // not every converter knows them.
@@ -162,27 +120,22 @@ std::string csv(const std::vector<Figures>& figures) {
 }
 
 std::string svg(const std::vector<Figures>& figures, const std::string& title, const std::string& subtitle) {
-    std::vector<std::vector<Figures>> lines;  // of each method
+    std::vector<Figures> rivals;
+    std::copy_if(figures.begin(), figures.end(), std::back_inserter(rivals), [](const Figures& f) { return f.rival; });
+    if (rivals.empty()) throw std::invalid_argument("a chart needs at least one method");
     double fastest = INFINITY, slowest = 0, best = INFINITY, worst = 0;
-    for (const Figures& f : figures) {
-        if (!f.rival) continue;
+    for (const Figures& f : rivals) {
         if (!(f.total_ms > 0) || !std::isfinite(f.total_ms) || !(f.error >= 0))
             throw std::invalid_argument("a chart needs positive times and errors that are not negative");
         fastest = std::min(fastest, f.total_ms), slowest = std::max(slowest, f.total_ms);
         if (f.error > 0) best = std::min(best, f.error), worst = std::max(worst, f.error);
-        const auto same = [&](const std::vector<Figures>& line) { return line[0].method == f.method; };
-        auto line = std::find_if(lines.begin(), lines.end(), same);
-        if (line == lines.end()) line = lines.insert(line, std::vector<Figures>());
-        line->push_back(f);
     }
-    if (lines.empty()) throw std::invalid_argument("a chart needs at least one method");
     if (worst == 0) best = worst = 1;  // nothing but zeros: any axis will do
     const LogAxis x(fastest, slowest, left, right), y(best, worst, floor_y, top);
     const auto place = [&](const Figures& f) { return Place{x(f.total_ms), f.error > 0 ? y(f.error) : zero_y}; };
 
-    std::string out =
-        format("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %g %g' width='%g' height='%g' role='img'>\n",
-               width, height, width, height);
+    std::string out = format("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %g %g' width='%g' height='%g' role='img'>\n",
+                             width, height, width, height);
     out += "<title>" + escaped(title) + "</title>\n" + style();
     out += format("<rect class='paper' width='%g' height='%g'/>\n", width, height);
     out += text({left, 34}, "title", title) + text({left, 57}, "quiet", subtitle);
@@ -202,48 +155,37 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
                   "(logarithmic)</text>\n", (top + bottom) / 2);
 
     // The efficient frontier: the least error that is to be had in a time, hence a staircase.
-    Labels labels;
     std::vector<Place> steps;
-    for (const Figures& f : figures)
+    for (const Figures& f : rivals)
         if (f.frontier) steps.push_back(place(f));
     std::sort(steps.begin(), steps.end(), [](const Place& a, const Place& b) { return a.x != b.x ? a.x < b.x : a.y > b.y; });
-    steps.push_back({right, steps.empty() ? bottom : steps.back().y});
-    std::string stairs = "M" + line_to(steps[0]);
-    for (std::size_t i = 1; i < steps.size(); i++) {
-        const Place corner{steps[i].x, steps[i - 1].y};
-        stairs += " L" + line_to(corner) + line_to(steps[i]);
-        labels.keep_clear(steps[i - 1], corner, 7), labels.keep_clear(corner, steps[i], 7);
+    if (!steps.empty()) {
+        std::string stairs = "M" + coordinates(steps[0]);
+        for (const Place& p : steps) stairs += format(" H%.1f V%.1f", p.x, p.y);
+        out += path("pale", stairs + format(" H%g", right));
+        out += text({steps.back().x + 16, steps.back().y - 10}, "quiet small", "efficient frontier");
     }
-    if (steps.size() > 1) out += path("pale", stairs);
 
-    for (const auto& line : lines)
-        for (std::size_t i = 0; i < line.size(); i++) {
-            labels.keep_clear(place(line[i]), place(line[i]), 9);
-            if (i > 0) labels.keep_clear(place(line[i - 1]), place(line[i]), 1.5);
-        }
-    std::string marks, names, sizes;  // over the lines, and last of all the words
-    for (int l = 0; l < static_cast<int>(lines.size()); l++) {
-        const int look = l % looks;
+    // The methods: their lines, then the marks over them, and last of all the words. Errors fall with time, so there is room
+    // to the left and below of a line, and to the right and above: neighbours have their words on different sides.
+    std::string marks, words, run;
+    int look = 0;
+    for (std::size_t i = 0; i < rivals.size(); i++) {
+        const Figures& f = rivals[i];
+        const Place p = place(f);
+        const bool first = i == 0 || rivals[i - 1].method != f.method, last = i + 1 == rivals.size() || rivals[i + 1].method != f.method;
+        if (first) run = "M";
+        run += coordinates(p);
+        marks += format("<path class='mark%d' transform='translate(%.1f %.1f)' d='%s'/>\n", look, p.x, p.y, outlines[look]);
+        if (f.frontier) marks += format("<circle class='ring' cx='%.1f' cy='%.1f' r='9.5'/>\n", p.x, p.y);
+        const bool below = look % 2 == 0;
         const std::string ink = format(" mark%d", look);
-        std::string run = "M";
-        for (const Figures& f : lines[l]) {
-            const Place p = place(f);
-            run += line_to(p);
-            marks += format("<path class='mark%d' transform='translate(%.1f %.1f)' d='%s'/>\n", look, p.x, p.y, outlines[look]);
-            if (f.frontier) marks += format("<circle class='ring' cx='%.1f' cy='%.1f' r='9.5'/>\n", p.x, p.y);
-        }
+        if (f.size) words += text({p.x + (below ? -11 : 11), p.y + (below ? 12 : -4)}, (below ? "small end" : "small") + ink, std::to_string(f.size));
+        if (!last) continue;
         out += path(format("line line%d", look).c_str(), run);
-        // The name at the line's slow end, where lines are apart.
-        const Place end = place(lines[l].back());
-        names += text(labels.place(end, lines[l][0].method, 14, end.x > (left + right) / 2 ? -1 : 1), "name" + ink, lines[l][0].method);
+        words += text(first ? Place{p.x - 14, p.y + 5} : Place{p.x, p.y + (below ? 28 : -20)}, "name end" + ink, f.method);
+        look = (look + 1) % looks;
     }
-    if (steps.size() > 1)
-        names += text(labels.place({right - 70, steps.back().y}, "efficient frontier", 11.5, -1), "quiet small", "efficient frontier");
-    for (int l = 0; l < static_cast<int>(lines.size()); l++)
-        for (const Figures& f : lines[l])
-            if (f.size) {
-                const std::string size = std::to_string(f.size);
-                sizes += text(labels.place(place(f), size, 11.5, l % 2 ? 1 : -1), format("small mark%d", l % looks), size);
-            }
-    return out + marks + names + sizes + "</svg>\n";
+    out += marks + words;
+    return out + "</svg>\n";
 }

@@ -18,55 +18,22 @@ constexpr const char* usage_text = R"(usage: report UMBRA'S OPTIONS AND MODELS
 The first prints what umbra's picture is off by: pixels that only one of picture and truth covers; the pixels that face the
 light; those of them that are falsely dark and falsely lit, as counts and in percent; and the RMSE of their colours.
 
-The second, also without any argument, prints these figures, milliseconds and bytes of each shadow method at each size of
-its buffer, and what theory says of the error; and the errors of stiff cases. It writes report.csv, stiffness.csv and
-report.svg.
-
-  -o DIR             folder of the three files (.)
-  --rounds N         runs of each for the times, in turn; the median counts (5)
-  --threads N        of the program where it is timed (1)
+The second, with -o or --rounds or without any argument, prints these figures, milliseconds and bytes of each shadow method
+at each size of its buffer, and what theory says of the error; and the errors of stiff cases. It writes report.csv,
+stiffness.csv and report.svg into the folder DIR (.). The milliseconds are medians of N rounds (5) of N threads (1).
 )";
 
-constexpr double bias = 43.34;       // the lesson's, of a depth of 2000 for two units of the scene
-constexpr int picture_side = 800;    // pixels of what is timed
-constexpr int fine_side = 3 * 800;   // ... of what is held against theory: at 6400 few pixels of 800 x 800 are wrong
-constexpr double tolerance = .10;    // how near theory should be ...
-constexpr int tolerated_from = 800;  // ... from which size up
-
-struct Options {
-    std::filesystem::path out;
-    int rounds, threads;
-    Arguments scene;  // umbra's
-};
-
-Options parse(Arguments arguments) {
-    const auto taken = [&](const std::string& option, const std::string& otherwise) {
-        const auto at = std::find(arguments.begin(), arguments.end(), option);
-        if (at == arguments.end()) return otherwise;
-        if (at + 1 == arguments.end()) throw std::invalid_argument(option + ": a value is missing");
-        const std::string value = at[1];
-        arguments.erase(at, at + 2);
-        return value;
-    };
-    const auto number_taken = [&](const std::string& option, const std::string& otherwise, int most) {
-        const std::string text = taken(option, otherwise);
-        int n = 0;
-        char rest;
-        if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most)
-            throw std::invalid_argument(option + ": \"" + text + "\" is not 1 to " + std::to_string(most));
-        return n;
-    };
-    const std::string out = taken("-o", ".");
-    const int rounds = number_taken("--rounds", "5", 1000), threads = number_taken("--threads", "1", 256);
-    return {out, rounds, threads, arguments};
-}
-
-Arguments size_of(int side) { return {"--size", std::to_string(side) + "x" + std::to_string(side)}; }
+constexpr const char* bias = "43.34";           // the lesson's, of a depth of 2000 for two units of the scene ...
+constexpr double scene_bias = .04334;           // ... and in the scene's unit
+constexpr const char* side = "800x800";         // pixels of what is timed
+constexpr const char* fine_side = "2400x2400";  // ... of what is held against theory: at 6400 few of 800 x 800 are wrong
+constexpr double tolerance = .10;               // how near theory should be ...
+constexpr int tolerated_from = 800;             // ... from which size up
 
 std::vector<Figures> methods() {
     std::vector<Figures> all;
     for (const auto& [name, arguments] : {std::pair<const char*, Arguments>{"shadow map", {"--shadow", "map"}},
-                                          {"constant bias", {"--bias", "43.34"}}})
+                                          {"constant bias", {"--bias", bias}}})
         for (const int size : {200, 400, 800, 1600, 3200, 6400})
             all.push_back({name, size, joined(arguments, {"--shadow-size", std::to_string(size)})});
     all.push_back({"exact", 0, {"--shadow", "exact"}});
@@ -75,44 +42,33 @@ std::vector<Figures> methods() {
     return all;
 }
 
-void measure_errors(const Program& umbra, const Options& opt, std::vector<Figures>& figures) {
-    Judge judge(umbra, joined(opt.scene, size_of(picture_side)));
-    for (Figures& f : figures) {
-        std::cerr << "report: errors of " << f.method << ' ' << f.size << '\n';
-        const PictureError e = judge.error(f.arguments);
-        f.acne = e.percent(e.falsely_dark), f.leak = e.percent(e.falsely_lit), f.error = e.percent(), f.rmse = e.rmse;
-    }
-}
-
 // All methods in turn, round after round: what slows the machine down for a while slows all of them.
-void measure_times(const Program& umbra, const Options& opt, std::vector<Figures>& figures) {
+void measure_times(const Program& umbra, const Arguments& scene, int rounds, std::vector<Figures>& figures) {
     std::vector<std::vector<double>> depth(figures.size()), shade = depth, total = depth;
-    const Arguments scene = joined(joined(opt.scene, size_of(picture_side)), {"--threads", std::to_string(opt.threads)});
-    for (int round = 0; round < opt.rounds; round++) {
-        std::cerr << "report: times, round " << round + 1 << " of " << opt.rounds << '\n';
-        for (std::size_t i = 0; i < figures.size(); i++) {
-            const Values said = umbra.run(joined(scene, figures[i].arguments));
-            depth[i].push_back(value_of(said, "depth_ms")), shade[i].push_back(value_of(said, "shade_ms"));
-            total[i].push_back(depth[i].back() + shade[i].back());
-            figures[i].bytes = std::llround(value_of(said, "shadow_bytes"));
-        }
-    }
-    const auto median = [](std::vector<double>& values) {
+    const auto median = [](std::vector<double> values) {
         std::sort(values.begin(), values.end());
         return (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
     };
-    for (std::size_t i = 0; i < figures.size(); i++)
-        figures[i].depth_ms = median(depth[i]), figures[i].shade_ms = median(shade[i]), figures[i].total_ms = median(total[i]);
+    for (int round = 1; round <= rounds; round++) {
+        std::cerr << "report: times, round " << round << " of " << rounds << '\n';
+        for (std::size_t i = 0; i < figures.size(); i++) {
+            Figures& f = figures[i];
+            const Values said = umbra.run(joined(scene, f.arguments));
+            depth[i].push_back(value_of(said, "depth_ms")), shade[i].push_back(value_of(said, "shade_ms"));
+            total[i].push_back(depth[i].back() + shade[i].back());
+            f.depth_ms = median(depth[i]), f.shade_ms = median(shade[i]), f.total_ms = median(total[i]);
+            f.bytes = std::llround(value_of(said, "shadow_bytes"));
+        }
+    }
 }
 
-void predict_errors(const Program& umbra, const Options& opt, std::vector<Figures>& figures) {
-    const Arguments fine = joined(opt.scene, size_of(fine_side));
-    const Scene scene(fine, umbra.folder());
+void predict_errors(const Program& umbra, const Arguments& arguments, std::vector<Figures>& figures) {
+    const Scene scene(arguments, umbra.folder());
     const Theorist theorist(RayCaster(scene.models), scene.view, scene.light, scene.threads);
     // The needles of the constant bias, up to sqrt(2)/25 of it long, are safe on surfaces of a slope up to 17.
-    constexpr double scene_bias = bias / 1000, short_texel = scene_bias / 25;
+    constexpr double short_texel = scene_bias / 25;
     const Theory constant = theorist.constant_bias(scene_bias, {short_texel, short_texel});
-    Judge judge(umbra, fine);
+    Judge judge(umbra, arguments);
     for (Figures& f : figures) {
         if (!f.size) continue;
         std::cerr << "report: theory for " << f.method << ' ' << f.size << '\n';
@@ -120,13 +76,12 @@ void predict_errors(const Program& umbra, const Options& opt, std::vector<Figure
         const Theory t = at_corner ? constant.with_texels(2 / (.75 * f.size) / short_texel)  // [-1,1] on 3/4 of the buffer
                                    : theorist.derived_bias(theorist.fitted_texel(f.size));
         const PictureError e = judge.error(f.arguments);
-        const double wrong = static_cast<double>(e.falsely_dark + e.falsely_lit);
         // The texel: the side of the square that has the mean distance of this one. The noise: if pixels were wrong
         // independently.
         f.prediction = {.floor = 100 * t.floor, .coefficient = (1 + at_corner) * nearest_texel_error,
                         .texel = t.mean_needle / mean_distance({1, 1}) / (1 + at_corner),
                         .boundary_per_area = t.boundary_per_area, .predicted = 100 * t.wrong(), .measured = e.percent(),
-                        .noise = e.percent(1) * std::sqrt(wrong)};
+                        .noise = e.percent(1) * std::sqrt(static_cast<double>(e.falsely_dark + e.falsely_lit))};
     }
 }
 
@@ -137,61 +92,75 @@ void print_columns(const std::string& csv, int begin, int end) {
     std::vector<int> widths;
     for (std::string line, cell; std::getline(lines, line);) {
         std::istringstream cells(line);
-        rows.emplace_back();
+        std::vector<std::string>& row = rows.emplace_back();
         for (int column = 0; std::getline(cells, cell, ','); column++) {
             if (column >= 2 && (column < begin || column >= end)) continue;
             std::erase(cell, '"');
-            rows.back().push_back(cell);
-            widths.resize(std::max(widths.size(), rows.back().size()));
-            int& width = widths[rows.back().size() - 1];
-            width = std::max(width, static_cast<int>(cell.size()));
+            row.push_back(cell);
+            widths.resize(std::max(widths.size(), row.size()));
+            widths[row.size() - 1] = std::max(widths[row.size() - 1], static_cast<int>(cell.size()));
         }
     }
     for (const auto& row : rows) {
-        for (std::size_t i = 0; i < row.size(); i++)
-            std::printf(i < 1 ? "%-*s" : "  %*s", widths[i], row[i].c_str());
+        for (std::size_t i = 0; i < row.size(); i++) std::printf(i < 1 ? "%-*s" : "  %*s", widths[i], row[i].c_str());
         std::puts("");
     }
 }
 
 void print(const std::vector<Figures>& figures, const std::vector<StiffRow>& stiff) {
     print_columns(csv(figures), 2, 11);
-    std::puts("frontier: no other method is as fast and as good, and better in one of the two\n\n"
-              "Theory: error = floor + coefficient * h * L/A, h the texel's side, L/A the shadow boundary's length per area.");
-    std::printf("Measured on %d x %d pixels, with one standard deviation of its noise.\n", fine_side, fine_side);
+    std::printf("frontier: no other method is as fast and as good, and better in one of the two\n\n"
+                "Theory: error = floor + coefficient * h * L/A, h the texel's side, L/A the shadow boundary's length per area.\n"
+                "Measured on %s pixels, with one standard deviation of its noise.\n", fine_side);
     print_columns(csv(figures), 11, 18);
     int within = 0, of = 0;
-    for (const Figures& f : figures) {
-        if (!f.prediction || f.size < tolerated_from) continue;
-        of++, within += std::fabs(f.prediction->measured - f.prediction->predicted) <= tolerance * f.prediction->predicted;
-    }
-    std::printf("%d of %d within %.0f %% of theory from size %d up\n", within, of, 100 * tolerance, tolerated_from);
-    std::puts("\nStiff and extreme cases: the error as each grows, and from where it is more than is bearable.");
+    for (const Figures& f : figures)
+        if (const auto& p = f.prediction; p && f.size >= tolerated_from)
+            of++, within += std::fabs(p->measured - p->predicted) <= tolerance * p->predicted;
+    std::printf("%d of %d within %.0f %% of theory from size %d up\n\n"
+                "Stiff and extreme cases: the error as each grows, and from where it is more than is bearable.\n",
+                within, of, 100 * tolerance, tolerated_from);
     print_columns(csv(stiff), 2, 5);
 }
 
-void make_table(const Program& umbra, const Options& opt) {
-    std::filesystem::create_directories(opt.out);
+void make_table(const Program& umbra, Arguments scene) {
+    const auto taken = [&](const std::string& option, const std::string& otherwise) {  // out of the arguments
+        const auto at = std::find(scene.begin(), scene.end(), option);
+        if (at == scene.end()) return otherwise;
+        if (at + 1 == scene.end()) throw std::invalid_argument(option + ": a value is missing");
+        const std::string value = at[1];
+        scene.erase(at, at + 2);
+        return value;
+    };
+    const std::filesystem::path out = taken("-o", ".");
+    const std::string threads = taken("--threads", "1"), rounds = taken("--rounds", "5");
+    int n = 0;
+    char rest;
+    if (std::sscanf(rounds.c_str(), "%5d%c", &n, &rest) != 1 || n < 1 || n > 1000)
+        throw std::invalid_argument("--rounds: \"" + rounds + "\" is not 1 to 1000");
+    std::filesystem::create_directories(out);
+
     std::vector<Figures> figures = methods();
-    measure_errors(umbra, opt, figures);
-    measure_times(umbra, opt, figures);
-    predict_errors(umbra, opt, figures);
+    Judge judge(umbra, joined(scene, {"--size", side}));
+    for (Figures& f : figures) {
+        std::cerr << "report: errors of " << f.method << ' ' << f.size << '\n';
+        const PictureError e = judge.error(f.arguments);
+        f.acne = e.percent(e.falsely_dark), f.leak = e.percent(e.falsely_lit), f.error = e.percent(), f.rmse = e.rmse;
+    }
+    measure_times(umbra, joined(scene, {"--size", side, "--threads", threads}), n, figures);
+    predict_errors(umbra, joined(scene, {"--size", fine_side}), figures);
     mark_frontier(figures);
     const std::vector<StiffRow> stiff = measure_stiffness(umbra);
     print(figures, stiff);
 
     std::string title = "Shadow error against time:";
-    for (const std::string& path : Scene(opt.scene, umbra.folder()).paths)
+    for (const std::string& path : Scene(scene, umbra.folder()).paths)
         title.append(title.back() == ':' ? " " : ", ").append(std::filesystem::path(path).stem().string());
-    const std::string side = std::to_string(picture_side),
-                      subtitle = side + " x " + side + " pixels, threads: " + std::to_string(opt.threads) + ", median of " +
-                                 std::to_string(opt.rounds) + " runs. Numbers at the marks: texels a side of the shadow buffer.";
-    const auto write = [&](const char* name, const std::string& text) {
-        write_bytes(opt.out / name, Bytes(text.begin(), text.end()));
-    };
-    write("report.csv", csv(figures));
-    write("stiffness.csv", csv(stiff));
-    write("report.svg", svg(figures, title, subtitle));
+    const std::string subtitle = side + (" pixels, threads: " + threads) + ", median of " + rounds +
+                                 " runs. Numbers at the marks: texels a side of the shadow buffer.";
+    for (const auto& [name, text] : {std::pair<const char*, std::string>{"report.csv", csv(figures)},
+                                     {"stiffness.csv", csv(stiff)}, {"report.svg", svg(figures, title, subtitle)}})
+        write_bytes(out / name, Bytes(text.begin(), text.end()));
 }
 
 }  // namespace
@@ -201,7 +170,7 @@ int main(int argc, char** argv) try {
     const auto given = [&](const char* option) { return std::find(arguments.begin(), arguments.end(), option) != arguments.end(); };
     if (given("--help")) return std::fputs(usage_text, stdout) < 0;
     const Program umbra(UMBRA_BINARY);
-    if (arguments.empty() || given("-o") || given("--rounds")) make_table(umbra, parse(arguments));
+    if (arguments.empty() || given("-o") || given("--rounds")) make_table(umbra, arguments);
     else std::puts(Judge(umbra, arguments).error().line().c_str());
     return std::fflush(stdout) != 0;
 } catch (const ProgramFailed& e) {

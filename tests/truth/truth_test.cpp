@@ -235,6 +235,7 @@ TEST("watertight: an edge that is hit belongs to the triangles on both sides") {
         CHECK(!caster->first_hit({0, 1 + 0x1p-52, 1}, {0, 0, -1}).has_value());
         CHECK(!caster->first_hit({0, .25, 1}, {0, 0, 1}).has_value());
     }
+    CHECK_EQ(both.first_hit({0, .25, 1}, {0, 0, -1})->triangle, 0);  // the smaller number
     // A hair beside the edge only one is left. The hair is far below the rounding of the coordinates.
     CHECK_EQ(both.first_hit({1e-30, .25, 1}, {0, 0, -1})->triangle, 1);
     CHECK_EQ(both.first_hit({-1e-30, .25, 1}, {0, 0, -1})->triangle, 0);
