@@ -132,16 +132,14 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     };
 
     constexpr double sub_pixel = 1. / 256;  // the step of 8 sub-pixel bits, the least that a rasterizer has
-    const std::vector<double> distances{1, 1e3, 1e6, 1e9, 1e12, 1e15};
+    const std::vector<double> distances{1, 1e3, 1e6, 1e9, 1e12, 1e15}, eyes{1.2, 1e2, 1e4, 1e6, 1e8}, grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
     const auto moved = [](double d) { return Corners({d, -d / 2, d}, {1, 1, 4}); };
-    family("scene moved away by", "classic Mshadow in float: pixels", sub_pixel, distances, [&](double d) { return moved(d).classic(); });
-    family("scene moved away by", "Mshadow: pixels", sub_pixel, distances, [&](double d) { return moved(d).here(umbra); });
-
-    const std::vector<double> eyes{1.2, 1e2, 1e4, 1e6, 1e8};
     const auto seen_from = [](double d) { return Corners({}, normalized(vec3{1, 1, 4}) * d); };
-    family("eye's distance (1/c)", "classic Mshadow in float: pixels", sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
+    const std::string classic = "classic Mshadow in float: pixels";
+    family("scene moved away by", classic, sub_pixel, distances, [&](double d) { return moved(d).classic(); });
+    family("scene moved away by", "Mshadow: pixels", sub_pixel, distances, [&](double d) { return moved(d).here(umbra); });
+    family("eye's distance (1/c)", classic, sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
 
-    const std::vector<double> grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
     const std::string plane = file(umbra, floor_of(1));
     for (const Arguments& method : {Arguments{"--bias", "43.34"}, {"--shadow", "map"}, {"--shadow", "exact"}})
         family("light over a plane at n.l", method[0] + " " + method[1] + ": falsely dark %", 0, grazing, [&](double n_l) {
@@ -150,20 +148,16 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
         });
 
     family("two layers apart by", "the rear one seen: %", 0, {1e-2, 1e-4, 1e-6, 1.3e-7, 1e-8, 1e-9}, [&](double gap) {
-        struct Layers final : IShader {
-            double gap;
-            vec4 vertex(int face, int corner) override {
-                const double x = corner == 1 ? 3 : -1, y = corner == 2 ? 3 : -1;
-                return {x, y, .577 + .037 * (x + y) + (face ? gap : 0), 1};
-            }
-        };
-        Layers layers;
-        layers.gap = gap;
-        DepthBuffer zbuffer(100, 100);
-        FaceBuffer faces(100, 100);
-        draw_depth(2, layers, viewport(0, 0, 100, 100), zbuffer, &faces, 0, 1);
+        std::string text = "vn 0 0 1\nvn 1 0 0\n";  // they look to different sides
+        for (const std::string layer : {"1", "2"}) {
+            for (const vec2& at : {vec2{-2, -2}, {6, -2}, {-2, 6}})
+                text += "v " + number(at.x) + ' ' + number(at.y) + ' ' + number(.077 + .037 * (at.x + at.y) + (layer == "2" ? gap : 0)) + '\n';
+            text += "f -3//" + layer + " -2//" + layer + " -1//" + layer + '\n';
+        }
+        umbra.run({"--size", "100x100", "--no-fit", "--eye", "0,0,4", "--draw", "normal", file(umbra, text)});
+        const TGAImage picture = TGAImage::read_tga_file(umbra.folder() / "framebuffer.tga");
         int rear = 0;
-        for (int i = 0; i < 10000; i++) rear += faces.row(i / 100)[i % 100] == 0;
+        for (int i = 0; i < 10000; i++) rear += picture.pixel(i % 100, i / 100)[0] == 255;  // blue: towards the viewer
         return rear / 100.;
     });
 
