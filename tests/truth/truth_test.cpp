@@ -36,20 +36,27 @@ void quad(Mesh& mesh, const vec3& a, const vec3& b, const vec3& c, const vec3& d
     mesh.push_back({a, c, d});
 }
 
+// The square [-size,size]^2 in the plane y = 0, its front upwards, n by n cells, moved by `place`.
+template <typename Place>
+Mesh grid(int n, double size, const Place& place) {
+    const auto at = [&](int i, int j) { return place(vec3{size * (2 * i - n) / n, 0, size * (2 * j - n) / n}); };
+    Mesh mesh;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) quad(mesh, at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
+    return mesh;
+}
+
 // Its sides cut n by n, their fronts outwards.
 Mesh box(const vec3& low, const vec3& high, int n = 1) {
     Mesh mesh;
     for (int side = 0; side < 6; side++)
-        for (int cell = 0; cell < n * n; cell++) {
-            const auto at = [&](int a, int b) {
-                vec3 v = side < 3 ? low : high;
-                const int i = (side + (side < 3 ? 2 : 1)) % 3, j = (side + (side < 3 ? 1 : 2)) % 3;
-                v[i] = low[i] + (high[i] - low[i]) * (cell % n + a) / n;
-                v[j] = low[j] + (high[j] - low[j]) * (cell / n + b) / n;
-                return v;
-            };
-            quad(mesh, at(0, 0), at(1, 0), at(1, 1), at(0, 1));
-        }
+        mesh = mesh + grid(n, 1, [&](const vec3& v) {  // the grid is the top, turned
+            const int k = side % 3, sign = side < 3 ? 1 : -1;
+            vec3 p;
+            p[k] = sign, p[(k + 1) % 3] = v.z, p[(k + 2) % 3] = sign * v.x;
+            for (int i = 0; i < 3; i++) p[i] = low[i] + (high[i] - low[i]) * ((p[i] + 1) / 2);
+            return p;
+        });
     return mesh;
 }
 
@@ -73,16 +80,6 @@ Mesh sphere(int rings, int sectors, double bumps = 0) {
             if (r > 0) mesh.push_back({at(r, s), at(r + 1, s), at(r, s + 1)});
             if (r < rings - 1) mesh.push_back({at(r, s + 1), at(r + 1, s), at(r + 1, s + 1)});
         }
-    return mesh;
-}
-
-// The square [-size,size]^2 in the plane y = 0, its front upwards, n by n cells, moved by `place`.
-template <typename Place>
-Mesh grid(int n, double size, const Place& place) {
-    const auto at = [&](int i, int j) { return place(vec3{size * (2 * i - n) / n, 0, size * (2 * j - n) / n}); };
-    Mesh mesh;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) quad(mesh, at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
     return mesh;
 }
 
