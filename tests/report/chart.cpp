@@ -61,7 +61,8 @@ struct Place {
 constexpr int looks = 4;
 constexpr const char* dashes[looks] = {"none", "7 4", "2 3", "10 3 2 3"};
 constexpr const char* outlines[looks] = {  // of marks, around (0,0)
-    "M-5 0 a5 5 0 1 0 10 0 a5 5 0 1 0 -10 0", "M-4.5 -4.5 h9 v9 h-9 z", "M0 -7 L7 0 0 7 -7 0 z", "M0 -6.5 L6 4.5 -6 4.5 z"};
+    "M-5 0 a5 5 0 1 0 10 0 a5 5 0 1 0 -10 0", "M-4.5 -4.5 h9 v9 h-9 z", "M0 -7 L7 0 0 7 -7 0 z",
+    "M0 -6.5 L6 4.5 -6 4.5 z"};
 
 std::string text(const Place& p, const std::string& kind, const std::string& what) {
     return format("<text x='%.1f' y='%.1f' class='%s'>", p.x, p.y, kind.c_str()) + escaped(what) + "</text>\n";
@@ -79,14 +80,17 @@ text { fill: currentColor; font-family: "Helvetica Neue", Arial, "DejaVu Sans", 
 .axis, .ring { stroke: currentColor; stroke-width: 1.3; fill: none }
 .pale { stroke-width: 13; stroke-linejoin: round; fill: none }
 .line { stroke-width: 2; fill: none }
-svg { color: #1b1f24 } .paper { fill: #fff } .grid { stroke: #dfe3e7 } .pale { stroke: #f5dd94 } .quiet { fill: #57606a }
+svg { color: #1b1f24 } .paper { fill: #fff } .grid { stroke: #dfe3e7 } .pale { stroke: #f5dd94 }
+.quiet { fill: #57606a }
 )";
-    std::string dark = "svg { color: #e6edf3 } .paper { fill: #0d1117 } .grid { stroke: #2b3138 } .pale { stroke: #5e4b10 } "
-                       ".quiet { fill: #9aa4af }\n";
+    std::string dark =
+        "svg { color: #e6edf3 } .paper { fill: #0d1117 } .grid { stroke: #2b3138 } .pale { stroke: #5e4b10 } "
+        ".quiet { fill: #9aa4af }\n";
     constexpr const char* colors[2][looks] = {{"#0067a8", "#c24a00", "#007a5a", "#9a3f86"},
                                               {"#6cb8f5", "#f5a04c", "#3fcf9f", "#e291cf"}};
     for (int i = 0; i < looks; i++) {
-        out += format(".line%d { stroke-dasharray: %s; stroke: %s } .mark%d { fill: %s }\n", i, dashes[i], colors[0][i], i, colors[0][i]);
+        out += format(".line%d { stroke-dasharray: %s; stroke: %s } .mark%d { fill: %s }\n", i, dashes[i], colors[0][i],
+                      i, colors[0][i]);
         dark += format(".line%d { stroke: %s } .mark%d { fill: %s }\n", i, colors[1][i], i, colors[1][i]);
     }
     return out + "@media screen and (prefers-color-scheme: dark) {\n" + dark + "}\n</style>\n";
@@ -105,12 +109,12 @@ void mark_frontier(std::vector<Figures>& figures) {
 
 std::string csv(const std::vector<Figures>& figures) {
     std::string out =
-        "method,size,acne_percent,leak_percent,error_percent,rmse,depth_ms,shade_ms,total_ms,bytes,frontier,floor_percent,"
-        "coefficient,texel,boundary_per_area,predicted_percent,measured_percent,noise_percent\n";
+        "method,size,acne_percent,leak_percent,error_percent,rmse,depth_ms,shade_ms,total_ms,bytes,frontier,"
+        "floor_percent,coefficient,texel,boundary_per_area,predicted_percent,measured_percent,noise_percent\n";
     for (const Figures& f : figures) {
         out += "\"" + f.method + "\"," + (f.size ? std::to_string(f.size) : "");
-        out += format(",%.4f,%.4f,%.4f,%.4f,%.3f,%.3f,%.3f,%lld,%d", f.acne, f.leak, f.error, f.rmse, f.depth_ms, f.shade_ms,
-                      f.total_ms, f.bytes, f.frontier);
+        out += format(",%.4f,%.4f,%.4f,%.4f,%.3f,%.3f,%.3f,%lld,%d", f.acne, f.leak, f.error, f.rmse, f.depth_ms,
+                      f.shade_ms, f.total_ms, f.bytes, f.frontier);
         if (const auto& p = f.prediction)
             out += format(",%.4f,%.4f,%.6f,%.4f,%.4f,%.4f,%.4f\n", p->floor, p->coefficient, p->texel,
                           p->boundary_per_area, p->predicted, p->measured, p->noise);
@@ -134,15 +138,17 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
     const LogAxis x(fastest, slowest, left, right), y(best, worst, floor_y, top);
     const auto place = [&](const Figures& f) { return Place{x(f.total_ms), f.error > 0 ? y(f.error) : zero_y}; };
 
-    std::string out = format("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %g %g' width='%g' height='%g' role='img'>\n",
-                             width, height, width, height);
+    std::string out =
+        format("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %g %g' width='%g' height='%g' role='img'>\n",
+               width, height, width, height);
     out += "<title>" + escaped(title) + "</title>\n" + style();
     out += format("<rect class='paper' width='%g' height='%g'/>\n", width, height);
     out += text({left, 34}, "title", title) + text({left, 57}, "quiet", subtitle);
 
     // Axes. The one of the error is broken above the band of zero, which has no place on a logarithmic scale.
     for (const double t : x.ticks)
-        out += path("grid", format("M%.1f %g V%g", x(t), top, bottom)) + text({x(t), bottom + 20}, "middle", format("%g", t));
+        out += path("grid", format("M%.1f %g V%g", x(t), top, bottom)) +
+               text({x(t), bottom + 20}, "middle", format("%g", t));
     const auto level = [&](double at, const std::string& label) {
         out += path("grid", format("M%g %.1f H%g", left, at, right)) + text({left - 10, at + 4.5}, "end", label);
     };
@@ -151,14 +157,15 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
     out += path("axis", format("M%g %g V%g M%g %g V%g H%g", left, top, gap_y - 4, left, gap_y + 4, bottom, right));
     out += path("axis", format("M%g %g l14 -6 M%g %g l14 -6", left - 7, gap_y - 1, left - 7, gap_y + 7));
     out += text({(left + right) / 2, bottom + 48}, "middle", "both passes, milliseconds (logarithmic)");
-    out += format("<text transform='translate(26 %g) rotate(-90)' class='middle'>pixels wrong, %% of those that face the light "
-                  "(logarithmic)</text>\n", (top + bottom) / 2);
+    out += format("<text transform='translate(26 %g) rotate(-90)' class='middle'>", (top + bottom) / 2) +
+           "pixels wrong, % of those that face the light (logarithmic)</text>\n";
 
     // The efficient frontier: the least error that is to be had in a time, hence a staircase.
     std::vector<Place> steps;
     for (const Figures& f : rivals)
         if (f.frontier) steps.push_back(place(f));
-    std::sort(steps.begin(), steps.end(), [](const Place& a, const Place& b) { return a.x != b.x ? a.x < b.x : a.y > b.y; });
+    std::sort(steps.begin(), steps.end(),
+              [](const Place& a, const Place& b) { return a.x != b.x ? a.x < b.x : a.y > b.y; });
     if (!steps.empty()) {
         std::string stairs = "M" + coordinates(steps[0]);
         for (const Place& p : steps) stairs += format(" H%.1f V%.1f", p.x, p.y);
@@ -166,24 +173,29 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
         out += text({steps.back().x + 16, steps.back().y - 10}, "quiet small", "efficient frontier");
     }
 
-    // The methods: their lines, then the marks over them, and last of all the words. Errors fall with time, so there is room
-    // to the left and below of a line, and to the right and above: neighbours have their words on different sides.
+    // The methods: their lines, then the marks over them, and last of all the words. Errors fall with time, so there is
+    // room to the left and below of a line, and to the right and above: neighbours have their words on different sides.
     std::string marks, words, run;
     int look = 0;
     for (std::size_t i = 0; i < rivals.size(); i++) {
         const Figures& f = rivals[i];
         const Place p = place(f);
-        const bool first = i == 0 || rivals[i - 1].method != f.method, last = i + 1 == rivals.size() || rivals[i + 1].method != f.method;
+        const bool first = i == 0 || rivals[i - 1].method != f.method,
+                   last = i + 1 == rivals.size() || rivals[i + 1].method != f.method;
         if (first) run = "M";
         run += coordinates(p);
-        marks += format("<path class='mark%d' transform='translate(%.1f %.1f)' d='%s'/>\n", look, p.x, p.y, outlines[look]);
+        marks +=
+            format("<path class='mark%d' transform='translate(%.1f %.1f)' d='%s'/>\n", look, p.x, p.y, outlines[look]);
         if (f.frontier) marks += format("<circle class='ring' cx='%.1f' cy='%.1f' r='9.5'/>\n", p.x, p.y);
         const bool below = look % 2 == 0;
         const std::string ink = format(" mark%d", look);
-        if (f.size) words += text({p.x + (below ? -11 : 11), p.y + (below ? 12 : -4)}, (below ? "small end" : "small") + ink, std::to_string(f.size));
+        if (f.size)
+            words += text({p.x + (below ? -11 : 11), p.y + (below ? 12 : -4)}, (below ? "small end" : "small") + ink,
+                          std::to_string(f.size));
         if (!last) continue;
         out += path(format("line line%d", look).c_str(), run);
-        words += text(first ? Place{p.x - 14, p.y + 5} : Place{p.x, p.y + (below ? 28 : -20)}, "name end" + ink, f.method);
+        words +=
+            text(first ? Place{p.x - 14, p.y + 5} : Place{p.x, p.y + (below ? 28 : -20)}, "name end" + ink, f.method);
         look = (look + 1) % looks;
     }
     out += marks + words;

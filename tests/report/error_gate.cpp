@@ -1,5 +1,5 @@
-// error_gate.cpp: the error figures that the shadow methods are held to, on the models of the project. It runs the program
-// that its argument names, so that programs with a known fault can be shown to it: they must not pass.
+// error_gate.cpp: the error figures that the shadow methods are held to, on the models of the project. It runs the
+// program that its argument names, so that programs with a known fault can be shown to it: they must not pass.
 #include <cstdio>
 
 #include "judge.h"
@@ -41,7 +41,8 @@ int main(int argc, char** argv) try {
     for (const std::string n_l : {".1", ".01", ".001", ".0001"}) {
         Judge judge(umbra, {"--light", ".8," + n_l + ",.6", plane.string()});
         for (const char* method : {"map", "exact"})
-            hold("plane at n.l = " + n_l + ", " + method, "falsely_dark", judge.error({"--shadow", method}).falsely_dark, 0);
+            hold("plane at n.l = " + n_l + ", " + method, "falsely_dark",
+                 judge.error({"--shadow", method}).falsely_dark, 0);
     }
     std::puts(open ? "the gate is open" : "the gate is shut");
     return open ? 0 : 1;

@@ -13,8 +13,10 @@ static void write_copy(const std::filesystem::path& path, const Model& model, co
     out.precision(17);  // gives the same double back
     out << "vn " << n.x << ' ' << n.y << ' ' << n.z << '\n';
     for (int face = 0; face < model.nfaces(); face++) {
-        for (int c = 0; c < 3; c++)
-            out << "v " << model.vert(face, c).x << ' ' << model.vert(face, c).y << ' ' << model.vert(face, c).z << '\n';
+        for (int c = 0; c < 3; c++) {
+            const vec3& v = model.vert(face, c);
+            out << "v " << v.x << ' ' << v.y << ' ' << v.z << '\n';
+        }
         out << "f -3//1 -2//1 -1//1\n";
     }
     if (!out.flush()) throw std::runtime_error(path.string() + ": cannot write");
@@ -25,12 +27,13 @@ Scene::Scene(const Arguments& arguments, const TemporaryFolder& folder)
     const auto vector = [](vec3& v) {
         return [&v](const char* s) { std::sscanf(s, "%lf,%lf,%lf", &v.x, &v.y, &v.z); };
     };
-    const auto other = [](const char*) {};
-    const std::map<std::string, std::function<void(const char*)>> with_value = {
+    std::map<std::string, std::function<void(const char*)>> with_value = {
         {"--size", [&](const char* s) { std::sscanf(s, "%dx%d", &view.width, &view.height); }},
-        {"--threads", [&](const char* s) { threads = std::atoi(s); }},
-        {"--eye", vector(view.eye)}, {"--center", vector(view.center)}, {"--up", vector(view.up)}, {"--light", vector(light)},
-        {"-o", other}, {"--shadow-size", other}, {"--shadow", other}, {"--bias", other}, {"--draw", other}};
+        {"--threads", [&](const char* s) { threads = std::atoi(s); }}};
+    with_value["--eye"] = vector(view.eye), with_value["--center"] = vector(view.center);
+    with_value["--up"] = vector(view.up), with_value["--light"] = vector(light);
+    for (const char* other : {"-o", "--shadow-size", "--shadow", "--bias", "--draw"})
+        with_value[other] = [](const char*) {};
     bool fit = true;
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
         const auto option = with_value.find(*arg);
@@ -56,9 +59,9 @@ Scene::Scene(const Arguments& arguments, const TemporaryFolder& folder)
 std::string PictureError::line() const {
     char text[300];
     std::snprintf(text, sizeof text,
-                  "coverage %ld facing %ld falsely_dark %ld falsely_dark_percent %.4f falsely_lit %ld falsely_lit_percent %.4f "
-                  "error_percent %.4f rmse %.4f",
-                  coverage, facing, falsely_dark, percent(falsely_dark), falsely_lit, percent(falsely_lit), percent(), rmse);
+                  "coverage %ld facing %ld falsely_dark %ld falsely_dark_percent %.4f falsely_lit %ld "
+                  "falsely_lit_percent %.4f error_percent %.4f rmse %.4f", coverage, facing, falsely_dark,
+                  percent(falsely_dark), falsely_lit, percent(falsely_lit), percent(), rmse);
     return text;
 }
 

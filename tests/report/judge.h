@@ -5,8 +5,8 @@
 #include "tgaimage.h"
 #include "truth.h"
 
-// What the program's arguments say of the scene, with the program's defaults; the models placed as it places them. So all
-// coordinates are relative to --center.
+// What the program's arguments say of the scene, with the program's defaults; the models placed as it places them. So
+// all coordinates are relative to --center.
 struct Scene {
     View view;
     vec3 light{1, 1, 0};
@@ -20,19 +20,21 @@ struct Scene {
 };
 
 struct PictureError {
-    long coverage = 0;      // pixels that only one of picture and truth covers: no shadow's doing, and left out of the rest
+    long coverage = 0;  // pixels that only one of picture and truth covers: no shadow's doing, and left out of the rest
     long facing = 0;        // pixels whose surface faces the light: the whole that the percentages are of
     long falsely_dark = 0;  // of those lit in truth: acne, and half of what a ragged boundary costs
     long falsely_lit = 0;   // of those shadowed in truth: leaks, and the other half
     double rmse = 0;        // over the channels of the facing pixels, from the picture with exact shadows; of 255
 
-    double percent(long wrong) const { return facing ? 100. * static_cast<double>(wrong) / static_cast<double>(facing) : 0; }
+    double percent(long wrong) const {
+        return facing ? 100. * static_cast<double>(wrong) / static_cast<double>(facing) : 0;
+    }
     double percent() const { return percent(falsely_dark + falsely_lit); }
     std::string line() const;  // name value name value ...
 };
 
-// Holds a picture against the truth. shadow: white where the picture says that the surface is lit. exact: the picture with
-// exact shadows. Throws std::invalid_argument where the sizes differ.
+// Holds a picture against the truth. shadow: white where the picture says that the surface is lit. exact: the picture
+// with exact shadows. Throws std::invalid_argument where the sizes differ.
 PictureError compare(const TruthImage& truth, const TGAImage& picture, const TGAImage& shadow, const TGAImage& exact);
 
 // Judges pictures of one scene that differ in their shadows.

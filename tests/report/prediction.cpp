@@ -31,7 +31,8 @@ Texel Theorist::fitted_texel(int size) const {
     vec2 low = seen(caster_.triangle(0)[0]), high = low;
     for (int f = 0; f < caster_.ntriangles(); f++)
         for (const vec3& corner : caster_.triangle(f))
-            for (int i = 0; i < 2; i++) low[i] = std::min(low[i], seen(corner)[i]), high[i] = std::max(high[i], seen(corner)[i]);
+            for (int i = 0; i < 2; i++)
+                low[i] = std::min(low[i], seen(corner)[i]), high[i] = std::max(high[i], seen(corner)[i]);
     return {(high.x - low.x) / size, (high.y - low.y) / size};
 }
 
@@ -49,7 +50,8 @@ Theory Theorist::theory(const Texel& texel, bool at_corner, int needles,
         for (int x = 0; x < view_.width; x++) {
             const auto hit = caster_.first_hit(view_.eye, view_.direction(x, y));
             if (!hit || !caster_.faces(hit->triangle, to_light_)) continue;
-            const bool shadowed = caster_.occluded(hit->triangle, hit->weight, to_light_), wrong = dark(*hit, {}) != shadowed;
+            const bool shadowed = caster_.occluded(hit->triangle, hit->weight, to_light_),
+                       wrong = dark(*hit, {}) != shadowed;
             count.facing++, count.wrong += wrong;
             for (int i = 0; i < needles; i++) {
                 const double low = at_corner ? 0 : -.5;

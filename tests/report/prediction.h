@@ -43,15 +43,15 @@ public:
     // Of a buffer of size x size texels that all triangles just fit into.
     Texel fitted_texel(int size) const;
 
-    // A bias derived from the slopes: a point's plane is carried to the sample, the texel's centre; what is above it there
-    // may be lower by what the nearest surface falls within a texel (along each axis the smaller of the two differences,
-    // half of it on a ridge). The floor is what that leaks where sample and point are the same. It and the boundary depend
-    // on the texel: a shadow's coast has more creeks the finer it is looked at.
+    // A bias derived from the slopes: a point's plane is carried to the sample, the texel's centre; what is above it
+    // there may be lower by what the nearest surface falls within a texel (along each axis the smaller of the two
+    // differences, half of it on a ridge). The floor is what that leaks where sample and point are the same. It and the
+    // boundary depend on the texel: a shadow's coast has more creeks the finer it is looked at.
     Theory derived_bias(const Texel& texel, int needles = 3) const;
 
-    // A constant bias, in the scene's unit; samples at the texels' corners with the smallest x and y, as an index cut to
-    // an integer finds them. The bias smooths the coast away, so one texel stands for all; it must be smaller than the
-    // bias over a surface's slope, or that is taken for its own shadow.
+    // A constant bias, in the scene's unit; samples at the texels' corners with the smallest x and y, as an index cut
+    // to an integer finds them. The bias smooths the coast away, so one texel stands for all; it must be smaller than
+    // the bias over a surface's slope, or that is taken for its own shadow.
     Theory constant_bias(double bias, const Texel& texel, int needles = 3) const;
 
 private:

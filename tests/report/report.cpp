@@ -1,5 +1,5 @@
-// report.cpp: what a picture's shadows are off by, and error against run time for each way of computing them. It runs the
-// program that it judges, as a child.
+// report.cpp: what a picture's shadows are off by, and error against run time for each way of computing them. It runs
+// the program that it judges, as a child.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -15,18 +15,19 @@ namespace {
 constexpr const char* usage_text = R"(usage: report UMBRA'S OPTIONS AND MODELS
        report [-o DIR] [--rounds N] [--threads N] [umbra's options and models]
 
-The first prints what umbra's picture is off by: pixels that only one of picture and truth covers; the pixels that face the
-light; those of them that are falsely dark and falsely lit, as counts and in percent; and the RMSE of their colours.
+The first prints what umbra's picture is off by: pixels that only one of picture and truth covers; the pixels that face
+the light; those of them that are falsely dark and falsely lit, as counts and in percent; and the RMSE of their colours.
 
-The second, with -o or --rounds or without any argument, prints these figures, milliseconds and bytes of each shadow method
-at each size of its buffer, and what theory says of the error; and the errors of stiff cases. It writes report.csv,
-stiffness.csv and report.svg into the folder DIR (.). The milliseconds are medians of N rounds (5) of N threads (1).
+The second, with -o or --rounds or without any argument, prints these figures, milliseconds and bytes of each shadow
+method at each size of its buffer, and what theory says of the error; and the errors of stiff cases. It writes
+report.csv, stiffness.csv and report.svg into the folder DIR (.). The milliseconds are medians of N rounds (5) of N
+threads (1).
 )";
 
 constexpr const char* bias = "43.34";           // the lesson's, of a depth of 2000 for two units of the scene ...
 constexpr double scene_bias = .04334;           // ... and in the scene's unit
 constexpr const char* side = "800x800";         // pixels of what is timed
-constexpr const char* fine_side = "2400x2400";  // ... of what is held against theory: at 6400 few of 800 x 800 are wrong
+constexpr const char* fine_side = "2400x2400";  // ... of what is held against theory: at 6400 few of 800x800 are wrong
 constexpr double tolerance = .10;               // how near theory should be ...
 constexpr int tolerated_from = 800;             // ... from which size up
 
@@ -73,8 +74,9 @@ void predict_errors(const Program& umbra, const Arguments& arguments, std::vecto
         if (!f.size) continue;
         std::cerr << "report: theory for " << f.method << ' ' << f.size << '\n';
         const int at_corner = f.method == "constant bias";
-        const Theory t = at_corner ? constant.with_texels(2 / (.75 * f.size) / short_texel)  // [-1,1] on 3/4 of the buffer
-                                   : theorist.derived_bias(theorist.fitted_texel(f.size));
+        const Theory t = at_corner
+                             ? constant.with_texels(2 / (.75 * f.size) / short_texel)  // [-1,1] on 3/4 of the buffer
+                             : theorist.derived_bias(theorist.fitted_texel(f.size));
         const PictureError e = judge.error(f.arguments);
         // The texel: the side of the square that has the mean distance of this one. The noise: if pixels were wrong
         // independently.
@@ -110,8 +112,8 @@ void print_columns(const std::string& csv, int begin, int end) {
 void print(const std::vector<Figures>& figures, const std::vector<StiffRow>& stiff) {
     print_columns(csv(figures), 2, 11);
     std::printf("frontier: no other method is as fast and as good, and better in one of the two\n\n"
-                "Theory: error = floor + coefficient * h * L/A, h the texel's side, L/A the shadow boundary's length per area.\n"
-                "Measured on %s pixels, with one standard deviation of its noise.\n", fine_side);
+                "Theory: error = floor + coefficient * h * L/A, h the texel's side, L/A the shadow boundary's length\n"
+                "per area. Measured on %s pixels, with one standard deviation of its noise.\n", fine_side);
     print_columns(csv(figures), 11, 18);
     int within = 0, of = 0;
     for (const Figures& f : figures)
@@ -167,7 +169,9 @@ void make_table(const Program& umbra, Arguments scene) {
 
 int main(int argc, char** argv) try {
     const Arguments arguments(argv + 1, argv + argc);
-    const auto given = [&](const char* option) { return std::find(arguments.begin(), arguments.end(), option) != arguments.end(); };
+    const auto given = [&](const char* option) {
+        return std::find(arguments.begin(), arguments.end(), option) != arguments.end();
+    };
     if (given("--help")) return std::fputs(usage_text, stdout) < 0;
     const Program umbra(UMBRA_BINARY);
     if (arguments.empty() || given("-o") || given("--rounds")) make_table(umbra, arguments);

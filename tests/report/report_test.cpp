@@ -1,5 +1,5 @@
-// report_test.cpp: what the report makes of pictures and figures: the errors, the frontier, the table of commas, the chart;
-// and the theory it holds them against. The measuring itself is not tested here.
+// report_test.cpp: what the report makes of pictures and figures: the errors, the frontier, the table of commas, the
+// chart; and the theory it holds them against. The measuring itself is not tested here.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -21,9 +21,10 @@ Figures figures(const std::string& method, int size, double error, double ms) {
 }
 
 std::vector<Figures> example() {
-    std::vector<Figures> all = {figures("map", 200, 2, 10),   figures("map", 800, .5, 14),  figures("map", 6400, .06, 80),
-                                figures("flat", 200, 3, 9),   figures("flat", 800, 1.5, 13), figures("flat", 6400, 1.2, 60),
-                                figures("exact", 0, 0, 20),   figures("exact", 0, 0, 20),   figures("off", 0, 20, 5)};
+    std::vector<Figures> all = {
+        figures("map", 200, 2, 10), figures("map", 800, .5, 14),   figures("map", 6400, .06, 80),
+        figures("flat", 200, 3, 9), figures("flat", 800, 1.5, 13), figures("flat", 6400, 1.2, 60),
+        figures("exact", 0, 0, 20), figures("exact", 0, 0, 20),    figures("off", 0, 20, 5)};
     all.back().rival = false;
     mark_frontier(all);
     return all;
@@ -73,7 +74,8 @@ const double circle_per_area = 2 * pi * radius / ((2 / .75) * (2 / .75) * normal
 
 TEST("the share of wrong pixels is counted over those that face the light and are drawn") {
     constexpr auto ground = Truth::background, away = Truth::away, lit = Truth::lit, shadowed = Truth::shadowed;
-    const TruthImage truth{5, 2, {ground, ground, away, lit, lit, lit, lit, lit, shadowed, shadowed}, std::vector<int>(10)};
+    const TruthImage truth{
+        5, 2, {ground, ground, away, lit, lit, lit, lit, lit, shadowed, shadowed}, std::vector<int>(10)};
     const auto image = [](const std::vector<int>& values) {
         TGAImage out(5, 2, TGAImage::RGB);
         for (int i = 0; i < 10; i++)
@@ -99,7 +101,8 @@ TEST("the scene is read from umbra's arguments, and a copy of each model turns i
     const TemporaryFolder folder("report_test");
     const std::string path = (folder / "far.obj").string();
     std::ofstream(path) << "v 6 0 0\nv 10 0 0\nv 6 2 .1\nvn 0 0 -1\nf 1//1 2//1 3//1\n";
-    const Arguments given{"--size", "30x20", "--light", "0,3,4", "--shadow", "map", "--eye", "1,2,3", "--center", "0,0,1"};
+    const Arguments given{"--size", "30x20", "--light",  "0,3,4", "--shadow", "map",
+                          "--eye",  "1,2,3", "--center", "0,0,1"};
     const Scene scene(joined(given, {path, "--quiet"}), folder);
     CHECK(scene.view.width == 30 && scene.view.height == 20 && scene.light == (vec3{0, 3, 4}));
     CHECK(scene.view.eye == (vec3{1, 2, 2}) && scene.view.center == vec3{} && scene.view.up == (vec3{0, 1, 0}));
@@ -131,11 +134,12 @@ TEST("a table of commas has the same number of fields in every line") {
 }
 TEST("the chart shows every rival, names every line, and rings the frontier") {
     const std::string text = svg(example(), "a < b & \"c\"", "under it");
-    for (const auto& [what, times] : {std::pair("<path class='mark", 8), {"class='ring'", 6}, {"class='line ", 3}, {">map<", 1},
-                                      {">flat<", 1}, {">exact<", 1}, {">efficient frontier<", 1}, {">6400<", 2}, {">off<", 0},
-                                      {"a &#60; b &#38; &#34;c&#34;", 2}, {"nan", 0}, {"inf", 0},
-                                      {"prefers-color-scheme: dark", 1}})
-        if (!CHECK_EQ(occurrences(text, what).size(), static_cast<std::size_t>(times))) std::cerr << "    " << what << '\n';
+    for (const auto& [times, what] : {std::pair(8, "<path class='mark"), {6, "class='ring'"}, {3, "class='line "},
+                                      {1, ">map<"}, {1, ">flat<"}, {1, ">exact<"}, {1, ">efficient frontier<"},
+                                      {2, ">6400<"}, {0, ">off<"}, {2, "a &#60; b &#38; &#34;c&#34;"}, {0, "nan"},
+                                      {0, "inf"}, {1, "prefers-color-scheme: dark"}})
+        if (!CHECK_EQ(occurrences(text, what).size(), static_cast<std::size_t>(times)))
+            std::cerr << "    " << what << '\n';
 }
 TEST("ten times the error is as far at one end of the axis as at the other, and zero is below it") {
     std::vector<Figures> f;
@@ -164,7 +168,8 @@ TEST("labels do not cover each other where methods are close in time") {
     for (const std::size_t at : occurrences(text, "class='small")) {
         const std::size_t start = text.rfind("<text", at), digits = text.find("</text>", at) - text.find('>', at) - 1;
         const double width = 6.4 * static_cast<double>(digits), x = number_after(text, "x='", start);
-        labels.push_back({text.compare(at, 16, "class='small end") == 0 ? x - width : x, number_after(text, "y='", start), width});
+        labels.push_back(
+            {text.compare(at, 16, "class='small end") == 0 ? x - width : x, number_after(text, "y='", start), width});
     }
     CHECK_EQ(labels.size(), std::size_t{12});
     for (const Label& a : labels)
@@ -178,13 +183,14 @@ TEST("a chart without methods, or with a time of zero, is refused") {
     CHECK_THROWS(svg({figures("m", 1, 1, NAN)}, "", ""), "positive");
     CHECK(!svg({figures("m", 1, 0, 3)}, "", "").empty());  // nothing but zeros
 }
-TEST("the mean distance in a rectangle is its integral, and in a square what the error of the nearest texel comes from") {
+TEST("the mean distance in a rectangle is its integral; the error of the nearest texel is that of a square") {
     CHECK_NEAR(2 / pi * mean_distance({1, 1}), nearest_texel_error, 1e-15);
     CHECK_NEAR((std::sqrt(2.) + std::log(1 + std::sqrt(2.))) / (3 * pi), nearest_texel_error, 1e-16);
     for (const Texel t : {Texel{1, 1}, Texel{3, 3}, Texel{1, 2}, Texel{2, 1}, Texel{.3, 5}}) {
         double sum = 0;
         constexpr int n = 1000;
-        for (int i = 0; i < n * n; i++) sum += std::hypot(((i % n + .5) / n - .5) * t.width, ((i / n + .5) / n - .5) * t.height);
+        for (int i = 0; i < n * n; i++)
+            sum += std::hypot(((i % n + .5) / n - .5) * t.width, ((i / n + .5) / n - .5) * t.height);
         CHECK_NEAR(sum / (n * n), mean_distance(t), 1e-5 * mean_distance(t));
     }
 }
@@ -211,7 +217,7 @@ TEST("creases that cast no shadow have no boundary") {  // slopes of 1/3 at most
     const Theorist theorist(RayCaster(floor_mesh(60, .033)), from_above, light, 2);
     CHECK_EQ(theorist.derived_bias({.2, .2}, 8).boundary_per_area, 0);
 }
-TEST("a constant bias has the same boundary, and needles twice as long; the predicted error is the one that a buffer makes") {
+TEST("a constant bias: the same boundary, needles twice as long, and the error that a buffer makes") {
     const RayCaster caster = disk_over(floor_mesh(1, 0));
     const Theory t = Theorist(caster, from_above, light, 2).constant_bias(.1, {.015, .015}, 16);
     CHECK_EQ(t.floor, 0);

@@ -31,7 +31,8 @@ std::string needles(double length_to_width) {
     Obj scene;
     for (int i = 0; i < 60; i++) {
         const double angle = .1 + .05 * i;
-        const vec3 along{.8 * std::cos(angle), .8 * std::sin(angle), 0}, across = vec3{-along.y, along.x, 0} / length_to_width;
+        const vec3 along{.8 * std::cos(angle), .8 * std::sin(angle), 0},
+            across = vec3{-along.y, along.x, 0} / length_to_width;
         const vec3 at{0, 0, .01 * i};
         scene.polygon({at - along, at + along - across, at + along + across});
     }
@@ -88,27 +89,33 @@ struct Corners {
         double worst = 0;
         for (std::size_t i = 0; i < at.size(); i++) {
             real off[2];
-            for (int k = 0; k < 2; k++) off[k] = place(i)[k] - (from + side * (exact[i][k] - low[k]) / (high[k] - low[k]));
+            for (int k = 0; k < 2; k++)
+                off[k] = place(i)[k] - (from + side * (exact[i][k] - low[k]) / (high[k] - low[k]));
             const real distance = std::hypot(off[0], off[1]);
-            worst = std::max(worst, std::isfinite(distance) ? std::min(static_cast<double>(distance), double{size}) : size);
+            worst =
+                std::max(worst, std::isfinite(distance) ? std::min(static_cast<double>(distance), double{size}) : size);
         }
         return worst;
     }
 
-    // The lesson's way: from the viewer's screen back through the inverse of its matrices, to the light's, all in float.
+    // The lesson's way: from the viewer's screen through the inverse of its matrices to the light's, all in float.
     double classic() const {
         const auto viewport = in<float>(middle_viewport(size, size));
-        const auto viewer = viewport * in<float>(projection(-1 / norm(eye - center))) * view_matrix(in<float>(eye), in<float>(center));
+        const auto viewer =
+            viewport * in<float>(projection(-1 / norm(eye - center))) * view_matrix(in<float>(eye), in<float>(center));
         const auto light = viewport * view_matrix(in<float>(center) + in<float>(to_light), in<float>(center));
         const auto back = invert(viewer);
         if (!back) return size;
-        const auto place = [&](std::size_t i) { return project(light * *back * point(project(viewer * point(in<float>(at[i]))))); };
+        const auto place = [&](std::size_t i) {
+            return project(light * *back * point(project(viewer * point(in<float>(at[i])))));
+        };
         return worst(place, {-1, -1, 0}, {1, 1, 0}, size / 8.L, .75L * size);
     }
     // The program's way: the model moved, the light's camera fitted to it. All corners fill the light's screen.
     double here(const Program& umbra) const {
         Obj scene;
-        for (std::size_t i = 0; i < at.size(); i++) scene.polygon({at[i], at[(i + 1) % at.size()], at[(i + 57) % at.size()]});
+        for (std::size_t i = 0; i < at.size(); i++)
+            scene.polygon({at[i], at[(i + 1) % at.size()], at[(i + 57) % at.size()]});
         std::vector<Model> models(1, Model(file(umbra, scene.text())));
         models[0].move(-center);
         if (models[0].nfaces() != static_cast<int>(at.size())) throw std::logic_error("a corner is lost");
@@ -116,7 +123,9 @@ struct Corners {
         auto low = exact[0], high = low;
         for (const auto& p : exact)
             for (int i = 0; i < 2; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
-        const auto place = [&](std::size_t i) { return project(uniform_Mshadow * point(models[0].vert(static_cast<int>(i), 0))); };
+        const auto place = [&](std::size_t i) {
+            return project(uniform_Mshadow * point(models[0].vert(static_cast<int>(i), 0)));
+        };
         return worst(place, low, high, 0, size);
     }
 };
@@ -132,26 +141,30 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     };
 
     constexpr double sub_pixel = 1. / 256;  // the step of 8 sub-pixel bits, the least that a rasterizer has
-    const std::vector<double> distances{1, 1e3, 1e6, 1e9, 1e12, 1e15}, eyes{1.2, 1e2, 1e4, 1e6, 1e8}, grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
+    const std::vector<double> distances{1, 1e3, 1e6, 1e9, 1e12, 1e15}, eyes{1.2, 1e2, 1e4, 1e6, 1e8},
+        grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
     const auto moved = [](double d) { return Corners({d, -d / 2, d}, {1, 1, 4}); };
     const auto seen_from = [](double d) { return Corners({}, normalized(vec3{1, 1, 4}) * d); };
     const std::string classic = "classic Mshadow in float: pixels";
     family("scene moved away by", classic, sub_pixel, distances, [&](double d) { return moved(d).classic(); });
-    family("scene moved away by", "Mshadow: pixels", sub_pixel, distances, [&](double d) { return moved(d).here(umbra); });
+    family("scene moved away by", "Mshadow: pixels", sub_pixel, distances,
+           [&](double d) { return moved(d).here(umbra); });
     family("eye's distance (1/c)", classic, sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
 
     const std::string plane = file(umbra, floor_of(1));
     for (const Arguments& method : {Arguments{"--bias", "43.34"}, {"--shadow", "map"}, {"--shadow", "exact"}})
-        family("light over a plane at n.l", method[0] + " " + method[1] + ": falsely dark %", 0, grazing, [&](double n_l) {
-            const PictureError e = error(umbra, joined(method, {"--light", ".8," + number(n_l) + ",.6", plane}));
-            return e.percent(e.falsely_dark);
-        });
+        family("light over a plane at n.l", method[0] + " " + method[1] + ": falsely dark %", 0, grazing,
+               [&](double n_l) {
+                   const PictureError e = error(umbra, joined(method, {"--light", ".8," + number(n_l) + ",.6", plane}));
+                   return e.percent(e.falsely_dark);
+               });
 
     family("two layers apart by", "the rear one seen: %", 0, {1e-2, 1e-4, 1e-6, 1.3e-7, 1e-8, 1e-9}, [&](double gap) {
         std::string text = "vn 0 0 1\nvn 1 0 0\n";  // they look to different sides
         for (const std::string layer : {"1", "2"}) {
             for (const vec2& at : {vec2{-2, -2}, {6, -2}, {-2, 6}})
-                text += "v " + number(at.x) + ' ' + number(at.y) + ' ' + number(.077 + .037 * (at.x + at.y) + (layer == "2" ? gap : 0)) + '\n';
+                text += "v " + number(at.x) + ' ' + number(at.y) + ' ' +
+                        number(.077 + .037 * (at.x + at.y) + (layer == "2" ? gap : 0)) + '\n';
             text += "f -3//" + layer + " -2//" + layer + " -1//" + layer + '\n';
         }
         umbra.run({"--size", "100x100", "--no-fit", "--eye", "0,0,4", "--draw", "normal", file(umbra, text)});
@@ -169,11 +182,15 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
             return static_cast<double>(e.coverage + e.falsely_dark + e.falsely_lit);
         });
     };
-    wrong_pixels("model scaled by", 0, {1e-300, 1e-30, 1e-6, 1, 1e6, 1e30, 1e300}, {}, [](double s) { return yard(s); });
-    wrong_pixels("one axis scaled by", 0, {1e-9, 1e-6, 1e-3, 1, 1e3, 1e6, 1e9}, {}, [](double s) { return yard(vec3{1, 1, s}); });
+    wrong_pixels("model scaled by", 0, {1e-300, 1e-30, 1e-6, 1, 1e6, 1e30, 1e300}, {},
+                 [](double s) { return yard(s); });
+    wrong_pixels("one axis scaled by", 0, {1e-9, 1e-6, 1e-3, 1, 1e3, 1e6, 1e9}, {}, [](double s) {
+        return yard(vec3{1, 1, s});
+    });
     for (const double d : {1e-1, 1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
         const vec3 center{0, -.25, 0};
-        wrong_pixels("eye this near to center", 0, {d}, {"--center", triple(center), "--eye", triple(center + vec3{.25, .125, 1} * d)},
+        wrong_pixels("eye this near to center", 0, {d},
+                     {"--center", triple(center), "--eye", triple(center + vec3{.25, .125, 1} * d)},
                      [](double) { return yard(1); });
     }
     // Coverage is snapped by up to 2^-17 pixel: 120 long edges of 240 pixels sweep over 120 * 240 * 2^-17 = .22 pixels'

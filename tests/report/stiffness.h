@@ -1,6 +1,6 @@
 // stiffness.h: the error of the program, and of the classic route where there is one, as a scene gets stiffer: farther
-// from the origin, more grazing, larger, smaller, nearer. The report's second table. Whether each case has the outcome that
-// it should have is the business of stiff_test.
+// from the origin, more grazing, larger, smaller, nearer. The report's second table. Whether each case has the outcome
+// that it should have is the business of stiff_test.
 #pragma once
 #include "program.h"
 

@@ -37,9 +37,12 @@ public:
     Values run(const Arguments& arguments) const {
         const std::filesystem::path said = folder_ / "said", complained = folder_ / "complained";
         std::string command = quoted(binary_);
-        for (const std::string& argument : joined(arguments, {"-o", folder_.path().string()})) command.append(" ").append(quoted(argument));
-        const int raw = std::system((command + " >" + quoted(said.string()) + " 2>" + quoted(complained.string())).c_str());
-        if (raw != 0) throw ProgramFailed(contents(complained), raw > 255 ? raw >> 8 : raw);  // POSIX keeps it in the high byte
+        for (const std::string& argument : joined(arguments, {"-o", folder_.path().string()}))
+            command.append(" ").append(quoted(argument));
+        const int raw =
+            std::system((command + " >" + quoted(said.string()) + " 2>" + quoted(complained.string())).c_str());
+        if (raw != 0)
+            throw ProgramFailed(contents(complained), raw > 255 ? raw >> 8 : raw);  // POSIX keeps it in the high byte
         Values values;
         std::istringstream words(contents(said));
         for (std::string name, value; words >> name >> value;) {  // name value name value ...

@@ -168,7 +168,7 @@ struct RayCaster::ExactTriangle {
             corner[i] = (exact(triangle[i]) - base) * (Exact(ray.weight.x) + ray.weight.y + ray.weight.z) -
                         (exact(ray.start[1]) - base) * ray.weight.y - (exact(ray.start[2]) - base) * ray.weight.z;
     }
-    // The determinant with the direction, opposite the corner i: unsheared, the area of the meeting times the direction.
+    // Opposite the corner i, the determinant with the direction: the area of the meeting, unsheared.
     Exact area(int i) const { return dot(direction, cross(corner[(i + 1) % 3], corner[(i + 2) % 3])); }
     // The determinant of the corners; the shear leaves it as it is.
     Exact volume() const { return dot(corner[0], cross(corner[1], corner[2])); }
@@ -245,7 +245,8 @@ void RayCaster::build(int node, int begin, int end) {
     Node box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}, begin, end - begin, 0};
     for (int i = begin; i < end; i++)
         for (const vec3& v : triangles_[order_[i]])
-            for (int k = 0; k < 3; k++) box.low[k] = std::min(box.low[k], v[k]), box.high[k] = std::max(box.high[k], v[k]);
+            for (int k = 0; k < 3; k++)
+                box.low[k] = std::min(box.low[k], v[k]), box.high[k] = std::max(box.high[k], v[k]);
     const vec3 side = box.high - box.low;
     const int axis = box.axis = side.x == largest(side) ? 0 : side.y == largest(side) ? 1 : 2;
     nodes_[node] = box;
@@ -263,8 +264,8 @@ void RayCaster::build(int node, int begin, int end) {
     build(children + 1, middle, end);
 }
 
-// Calls visit(number) for every triangle whose box the ray meets within the limit, nearer boxes first. `visit` returns the
-// new limit, below 0 to stop.
+// Calls visit(number) for every triangle whose box the ray meets within the limit, nearer boxes first. `visit` returns
+// the new limit, below 0 to stop.
 template <typename Visit>
 void RayCaster::traverse(const Ray& ray, Visit visit) const {
     double limit = infinity;
@@ -319,7 +320,9 @@ std::optional<Hit> RayCaster::first_hit(const vec3& origin, const vec3& directio
             bool nearer = !best || meeting.t < best->t;
             if (best && std::fabs(meeting.t - best->t) <= meeting.t_error + best->t_error) {  // too close to call
                 const int order = Meeting::exact_order(ray, triangles_[number], triangles_[nearest]);
-                nearer = order != 0 ? order < 0 : meeting.front_seen != best->front_seen ? meeting.front_seen : number < nearest;
+                nearer = order != 0                               ? order < 0
+                         : meeting.front_seen != best->front_seen ? meeting.front_seen
+                                                                  : number < nearest;
             }
             if (nearer) best = meeting, nearest = number;
         }
@@ -368,9 +371,11 @@ TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light,
     // Refused is what would make every ray meaningless; what is left cannot throw in a thread.
     if (view.width < 1 || view.height < 1) throw std::invalid_argument("a picture without pixels");
     (void)view.direction(0, 0);
-    if (!(largest(to_light) > 0 && std::isfinite(largest(to_light)))) throw std::invalid_argument("a light without a direction");
+    if (!(largest(to_light) > 0 && std::isfinite(largest(to_light))))
+        throw std::invalid_argument("a light without a direction");
     const std::size_t pixels = static_cast<std::size_t>(view.width) * view.height;
-    TruthImage image{view.width, view.height, std::vector<Truth>(pixels, Truth::background), std::vector<int>(pixels, -1)};
+    TruthImage image{view.width, view.height, std::vector<Truth>(pixels, Truth::background),
+                     std::vector<int>(pixels, -1)};
     for_rows(view.height, threads, [&](int y) {
         for (int x = 0; x < view.width; x++) {
             const auto hit = caster.first_hit(view.eye, view.direction(x, y));

@@ -65,9 +65,9 @@ public:
     bool faces(int triangle, const vec3& direction) const;
 
 private:
-    struct Node {  // a leaf holds the triangles order_[first, first+count); an inner node, count 0, nodes first and first+1
+    struct Node {  // a leaf holds the triangles order_[first, first+count), an inner node the nodes first and first+1
         vec3 low, high;
-        int first, count, axis;  // of which the first has the smaller coordinates along the axis
+        int first, count, axis;  // count is 0 for an inner node; its first has the smaller coordinates along the axis
     };
     struct Ray;
     struct ExactTriangle;

@@ -86,7 +86,9 @@ Mesh sphere(int rings, int sectors, double bumps = 0) {
 vec3 unchanged(const vec3& v) { return v; }
 
 Mesh landscape(int n) {  // creases of all kinds
-    return grid(n, 1, [](const vec3& v) { return vec3{v.x, .4 * std::sin(50 * v.x + 170 * v.z * v.x + 80 * v.z), v.z}; });
+    return grid(n, 1, [](const vec3& v) {
+        return vec3{v.x, .4 * std::sin(50 * v.x + 170 * v.z * v.x + 80 * v.z), v.z};
+    });
 }
 
 Mesh soup(int n, double length, double width) {
@@ -148,7 +150,8 @@ Verdict brute_force(const Mesh& mesh, const vec3l& eye, const vec3l& to_pixel, c
     verdict.close |= second - nearest < margin * nearest || std::fabs(dot(n, light)) < margin;
     verdict.truth = dot(n, light) > 0 ? Truth::lit : Truth::away;
     for (int i = 0; i < static_cast<int>(mesh.size()) && dot(n, light) > 0; i++)
-        if (i != verdict.triangle && meet(mesh[i], eye + to_pixel * nearest, light) < none) verdict.truth = Truth::shadowed;
+        if (i != verdict.triangle && meet(mesh[i], eye + to_pixel * nearest, light) < none)
+            verdict.truth = Truth::shadowed;
     return verdict;
 }
 
@@ -167,10 +170,12 @@ TEST("brute force: bumps, boxes, creases, needles, and soups of large and small 
             const vec3 light = unit(random);
             const TruthImage image = cast(caster, view, light);
             // The camera as it is defined, written out once more.
-            const vec3l z = normalized(wide(view.eye - view.center)), x = normalized(cross(wide(view.up), z)), y = cross(z, x);
+            const vec3l z = normalized(wide(view.eye - view.center)), x = normalized(cross(wide(view.up), z)),
+                        y = cross(z, x);
             for (; pixels < (i + 1) * 480; pixels++) {
                 const int at = pixels % 480;
-                const vec3l seen = x * ((at % 24 + .5L - 12) / 7.5L) + y * ((at / 24 + .5L - 10) / 7.5L) + wide(view.center);
+                const vec3l seen =
+                    x * ((at % 24 + .5L - 12) / 7.5L) + y * ((at / 24 + .5L - 10) / 7.5L) + wide(view.center);
                 const Verdict v = brute_force(mesh, wide(view.eye), seen - wide(view.eye), wide(light));
                 counts[static_cast<int>(image.pixel[at])]++;
                 close += v.close;
@@ -189,7 +194,7 @@ TEST("brute force: bumps, boxes, creases, needles, and soups of large and small 
 // From a point within a closed mesh every ray must meet it: aimed at corners, at points of edges, anywhere.
 static void cannot_escape(const Mesh& mesh, const vec3& origin, int rays) {
     Random random(11);
-    const Triangle receiver{origin, origin + vec3{0x1p-20, 0, 0}, origin + vec3{0, 0x1p-20, 0}};  // to send shadow rays from
+    const Triangle receiver{origin, origin + vec3{0x1p-20, 0, 0}, origin + vec3{0, 0x1p-20, 0}};  // of shadow rays
     const RayCaster caster(mesh), shadow_caster(mesh + Mesh{receiver});
     double size = 0;
     for (const Triangle& t : mesh)
@@ -219,7 +224,7 @@ TEST("watertight: no ray slips out of a bumpy sphere, of a cube of integer edges
         const auto hit = RayCaster(cube).first_hit({1, -2, 3}, direction);
         if (CHECK(hit.has_value())) CHECK_EQ(hit->point[side % 3], side < 3 ? 4. : -4.);
     }
-    const vec3 tip{1e3, 0, 0}, a{0, 1e-3, 0}, b{0, -1e-3, 1e-3}, c{0, -1e-3, -1e-3};  // a million times longer than wide
+    const vec3 tip{1e3, 0, 0}, a{0, 1e-3, 0}, b{0, -1e-3, 1e-3}, c{0, -1e-3, -1e-3};
     cannot_escape({{a, b, tip}, {b, c, tip}, {c, a, tip}, {a, c, b}}, {1, 0, 0}, 5000);
 }
 TEST("watertight: an edge that is hit belongs to the triangles on both sides") {
@@ -259,7 +264,8 @@ TEST("of coincident faces the one is seen that shows its front, and neither shad
     Random random(21);
     for (int i = 0; i < 10; i++) {
         const auto on_side = [&](const vec3& v) { return (dot(v, normal) < 0) == (i % 2 == 1) ? v : -v; };
-        const TruthImage image = cast(RayCaster(mesh), {on_side(unit(random) * 3), {}, {0, 1, 0}, 60, 60}, on_side(unit(random)));
+        const TruthImage image =
+            cast(RayCaster(mesh), {on_side(unit(random) * 3), {}, {0, 1, 0}, 60, 60}, on_side(unit(random)));
         CHECK(all_lit(image, 100));
         for (const int triangle : image.triangle) CHECK(triangle < 0 || (triangle >= 50) == i % 2);
     }
