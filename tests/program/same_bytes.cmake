@@ -11,16 +11,13 @@ set(ENV{WINEPREFIX} ${FOLDER}/wine)
 file(MAKE_DIRECTORY ${FOLDER}/wine)
 
 # Adds to builds a program that the project's own CMakeLists.txt makes, so that its flags are the ones that are tested.
-# The level of optimisation is the only one that the build type would have added. What runs the program of another
-# machine is the emulator; "" for this one's. Linked statically, it needs no library of that system.
+# The level of optimisation is the only one that the build type would have added. The emulator runs the program of
+# another machine (one of its names; "" for this machine); linked statically, it needs no library of that machine.
 function(build name compiler level emulator)
   find_program(path_of_${compiler} ${compiler})
-  set(runner "")
-  if(emulator)
-    find_program(path_of_${emulator} ${emulator})
-    set(runner ${path_of_${emulator}})
-  endif()
-  if(NOT path_of_${compiler} OR (emulator AND NOT runner))
+  find_program(emulator_of_${name} NAMES ${emulator} PATHS /usr/lib/wine)
+  if(NOT path_of_${compiler} OR (emulator AND NOT emulator_of_${name}))
+    list(JOIN emulator " or " emulator)
     message(STATUS "skipped: ${name}: it needs ${compiler} ${emulator}")
     return()
   endif()
@@ -32,7 +29,10 @@ function(build name compiler level emulator)
                   COMMAND_ERROR_IS_FATAL ANY OUTPUT_QUIET)
   message(STATUS "built: ${name}")
   file(GLOB program ${FOLDER}/${name}/umbra ${FOLDER}/${name}/umbra.exe)
-  set(run_${name} ${runner} ${program} PARENT_SCOPE)
+  set(run_${name} ${program} PARENT_SCOPE)
+  if(emulator)
+    set(run_${name} ${emulator_of_${name}} ${program} PARENT_SCOPE)
+  endif()
   set(builds ${builds} ${name} PARENT_SCOPE)
 endfunction()
 
@@ -45,11 +45,12 @@ endif()
 if(NOT UMBRA_BY STREQUAL Clang)
   build(clang clang++ -O3 "")
 endif()
-build(aarch64 aarch64-linux-gnu-g++ -O1 qemu-aarch64 -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_EXE_LINKER_FLAGS=-static)
-build(windows x86_64-w64-mingw32-g++-posix -O0 wine -DCMAKE_SYSTEM_NAME=Windows -DCMAKE_EXE_LINKER_FLAGS=-static)
+set(static -DCMAKE_EXE_LINKER_FLAGS=-static)
+build(aarch64 aarch64-linux-gnu-g++ -O1 "qemu-aarch64;qemu-aarch64-static" -DCMAKE_SYSTEM_NAME=Linux ${static})
+build(windows x86_64-w64-mingw32-g++-posix -O0 "wine;wine64" -DCMAKE_SYSTEM_NAME=Windows ${static})
 
-# Every build draws the scene; the first one on a single thread. What it says goes to a file, not to a pipe: the services
-# that wine starts would hold that open for seconds.
+# Every build draws the scene; the first one on a single thread. What it says goes to a file, not to a pipe: the
+# services that wine starts would hold that open for seconds.
 function(compare scene)
   foreach(build ${builds})
     file(REMOVE ${FOLDER}/depth.tga ${FOLDER}/framebuffer.tga)
