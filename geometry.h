@@ -20,8 +20,8 @@
 // ---- lanes: several numbers side by side, as a GPU has them ----
 //
 // What is written once with these types is done for a few pixels at once, in the processor's vector registers: a coord
-// says where something is, in doubles; a real says how bright it is, for which floats are enough; a mask is a yes or no.
-// Each lane holds what the number alone would be, bit for bit, so that the count of lanes shows in no picture.
+// says where something is, in doubles; a real says how bright it is, for which floats are enough; a mask is a yes or
+// no. Each lane holds what the number alone would be, bit for bit, so that the count of lanes shows in no picture.
 
 #if !defined(__GNUC__)  // neither gcc nor clang: no vectors that have operators, so one lane
 constexpr int lanes = 1;
@@ -242,7 +242,10 @@ template <typename T>
 struct vec<4, T> {
     T x{}, y{}, z{}, w{};
     constexpr T& operator[](int i) { assert(i >= 0 && i < 4); return i < 2 ? (i ? y : x) : (i == 2 ? z : w); }
-    constexpr const T& operator[](int i) const { assert(i >= 0 && i < 4); return i < 2 ? (i ? y : x) : (i == 2 ? z : w); }
+    constexpr const T& operator[](int i) const {
+        assert(i >= 0 && i < 4);
+        return i < 2 ? (i ? y : x) : (i == 2 ? z : w);
+    }
     constexpr vec<3, T> xyz() const { return {x, y, z}; }
 };
 

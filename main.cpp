@@ -75,7 +75,8 @@ struct PhongShader final : IShader {
         const vec3& v = model.vert(iface, nthvert);
         varying_uv[nthvert] = model.uv(iface, nthvert);
         varying_sb[nthvert] = project(shadow.M * point(v));
-        if (material.normal.empty()) varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
+        if (material.normal.empty())
+            varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
         if (!material.tangent.empty()) varying_tri[nthvert] = (uniform_M * point(v)).xyz();
         return uniform_PM * point(v);
     }

@@ -54,8 +54,8 @@ Camera fitted(const Camera& camera, const std::vector<Model>& models, int size) 
     for (int i = 0; i < 3; i++) largest = std::max({largest, std::fabs(low[i]), std::fabs(high[i])});
     for (int i = 0; i < 3; i++) {  // the box [low,high] to [-1,1]^3
         double half = high[i] / 2 - low[i] / 2;
-        // What is flat as the light sees it has a depth of rounding alone, which must not be blown up: it is some 2^-50 of
-        // the largest coordinate, and screen_depth/2 * 2^-50 / 2^-24 is below a quarter of depth_rounding.
+        // What is flat as the light sees it has a depth of rounding alone, which must not be blown up: it is some 2^-50
+        // of the largest coordinate, and screen_depth/2 * 2^-50 / 2^-24 is below a quarter of depth_rounding.
         if (i == 2) half = std::max(half, largest * 0x1p-24);
         if (!(half >= 0x1p-1000)) half = 1;  // no extent, or one whose inverse is no double: any scale will do
         result.Projection[i][i] = 1 / half;
@@ -77,7 +77,8 @@ TGAImage depth_picture(const DepthBuffer& depths) {
     float far = -DepthBuffer::nothing, near = DepthBuffer::nothing;
     for (int y = 0; y < depths.height(); y++)
         for (int x = 0; x < depths.width(); x++)
-            if (const float z = depths.row(y)[x]; z != DepthBuffer::nothing) far = std::min(far, z), near = std::max(near, z);
+            if (const float z = depths.row(y)[x]; z != DepthBuffer::nothing)
+                far = std::min(far, z), near = std::max(near, z);
     const double scale = near > far ? (white - darkest) / (double{near} - double{far}) : 0;
     TGAImage picture(depths.width(), depths.height(), TGAImage::GRAYSCALE);
     for (int y = 0; y < depths.height(); y++)
@@ -91,8 +92,8 @@ TGAImage depth_picture(const DepthBuffer& depths) {
 
 namespace {
 
-// Threads that wait for work, which is given out in rounds. Who gives it out works too. Waiting for an atomic spins for a
-// moment before it sleeps, which is quicker than a condition variable: a pass takes a millisecond or two.
+// Threads that wait for work, which is given out in rounds. Who gives it out works too. Waiting for an atomic spins for
+// a moment before it sleeps, which is quicker than a condition variable: a pass takes a millisecond or two.
 class Pool {
 public:
     explicit Pool(int threads) {
@@ -167,23 +168,23 @@ void parallel_for(int n, const std::function<void(int, int)>& work) {
 
 namespace {
 
-// Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers; depth and barycentric coordinates
-// come from the corners as they are.
+// Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers; depth and barycentric
+// coordinates come from the corners as they are.
 constexpr int subpixel_bits = 16;
 constexpr int most_corners = 8;  // of a triangle cut by the near plane and four guard planes
 
-// The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the rounding of
-// a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then moves by
-// 2^15 * 2^-50 / w_near. With w_near = 2^-22 that is 2^-13 pixel, which no picture shows, and things stay visible
-// down to a quarter of a millionth of the viewing distance.
+// The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the
+// rounding of a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then
+// moves by 2^15 * 2^-50 / w_near. With w_near = 2^-22 that is 2^-13 pixel, which no picture shows, and things stay
+// visible down to a quarter of a millionth of the viewing distance.
 constexpr double w_near = 1. / (1 << 22);
 
-// How far outside of the picture, in pixels, coverage is still computed exactly instead of being clipped: most faces that
-// cross the border need no clipping. 2 * 4096 + 16384 pixels at 16 sub-pixel bits make differences below 2^30.6.
+// How far outside of the picture, in pixels, coverage is still computed exactly instead of being clipped: most faces
+// that cross the border need no clipping. 2 * 4096 + 16384 pixels at 16 sub-pixel bits make differences below 2^30.6.
 constexpr double guard = 4096;
 
-// A face in homogeneous screen coordinates, which may be scaled at will: near is the w of the near plane at their scale,
-// size their largest magnitude.
+// A face in homogeneous screen coordinates, which may be scaled at will: near is the w of the near plane at their
+// scale, size their largest magnitude.
 struct Screen {
     vec4 corner[3];
     double size, near;
@@ -224,8 +225,8 @@ struct Plane {
     void pull(vec4& s) const { s[axis] = axis == 3 ? bound : bound * s.w; }
 };
 
-// Sutherland and Hodgman, one plane. A cut edge gets the same new corner from both of its faces, bit for bit: it is always
-// computed from the inner towards the outer end.
+// Sutherland and Hodgman, one plane. A cut edge gets the same new corner from both of its faces, bit for bit: it is
+// always computed from the inner towards the outer end.
 int clip_polygon(const Plane& plane, const vec4* in, int n, vec4* out) {
     int m = 0;
     for (int i = 0; i < n; i++) {
@@ -261,7 +262,8 @@ Point snapped(const vec4& s, int width, int height) {
 
 // Cuts the face to what is in front of the eye and inside the guard band; returns the number of corners, 0 for nothing.
 int clip(const Screen& s, int width, int height, Point (&corners)[most_corners]) {
-    const Plane planes[] = {{3, 1, s.near}, {0, 1, -guard}, {0, -1, width + guard}, {1, 1, -guard}, {1, -1, height + guard}};
+    const Plane planes[] = {
+        {3, 1, s.near}, {0, 1, -guard}, {0, -1, width + guard}, {1, 1, -guard}, {1, -1, height + guard}};
     vec4 polygon[most_corners];
     std::copy_n(s.corner, 3, polygon);
     int n = 3;
@@ -277,8 +279,8 @@ int clip(const Screen& s, int width, int height, Point (&corners)[most_corners])
     return n;
 }
 
-// What a face covers: a convex polygon of n snapped corners, the pixels whose centres lie in its box, and its depth, which
-// is linear on the screen.
+// What a face covers: a convex polygon of n snapped corners, the pixels whose centres lie in its box, and its depth,
+// which is linear on the screen.
 struct Coverage {
     int n, first;  // the corners, in a list of many
     int xmin, xmax, ymin, ymax;
@@ -307,10 +309,10 @@ bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
     return c.xmin <= c.xmax && c.ymin <= c.ymax;
 }
 
-// Perspective without a division per corner (Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates",
-// 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are functions
-// ex dx + ey dy + e0 that are linear on the screen, and in the ratio of the barycentric coordinates on the face. They hold
-// for the whole face, clipped or not, corners behind the eye included. dx and dy are relative to the centre of the pixel
+// Perspective without a division per corner (Olano and Greer, "Triangle scan conversion using 2D homogeneous
+// coordinates", 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are functions ex dx +
+// ey dy + e0 that are linear on the screen, and in the ratio of the barycentric coordinates on the face. They hold for
+// the whole face, clipped or not, corners behind the eye included. dx and dy are relative to the centre of the pixel
 // (xmin, ymin) of the face, which keeps the products small.
 struct Barycentric {
     vec3 ex, ey, e0;
@@ -318,7 +320,8 @@ struct Barycentric {
 
 // Also completes c by the depth, sum(z_i e_i) / sum(w_i e_i): the denominator is |det| everywhere.
 Barycentric planes(Screen s, Coverage& c) {
-    // The products of three coordinates that follow stay within the range of a double for these sizes; others are scaled.
+    // The products of three coordinates that follow stay within the range of a double for these sizes; others are
+    // scaled.
     if (!(s.size > 0x1p-200 && s.size < 0x1p200))
         for (vec4& p : s.corner)
             for (int i = 0; i < 4; i++) p[i] = std::scalbn(p[i], -std::ilogb(s.size));
@@ -349,11 +352,11 @@ Barycentric planes(Screen s, Coverage& c) {
 
 // ---- the pixels of a face ----
 
-// Calls visit(y, x_begin, x_end) for the pixels on the rows [y_begin, y_end) of the triangle of the corners 0, k-1 and k.
-// The edge function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies on
-// the edge and belongs to it if the edge is a left one (it runs down, counter-clockwise) or a top one (it runs left), so
-// that of two triangles sharing an edge exactly one owns the pixel. Range: with max_size pixels and the guard band,
-// differences of coordinates are below 2^30.6, edge functions below 2^62.2.
+// Calls visit(y, x_begin, x_end) for the pixels on the rows [y_begin, y_end) of the triangle of the corners 0, k-1 and
+// k. The edge function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies
+// on the edge and belongs to it if the edge is a left one (it runs down, counter-clockwise) or a top one (it runs
+// left), so that of two triangles sharing an edge exactly one owns the pixel. Range: with max_size pixels and the guard
+// band, differences of coordinates are below 2^30.6, edge functions below 2^62.2.
 //
 // Along a row an edge function grows by the same step from pixel to pixel. How often the step goes into it is where it
 // changes its sign; from row to row that grows by a quotient and a remainder, as in Bresenham's lines.
@@ -396,8 +399,8 @@ void for_each_span_of_fan(const Coverage& c, const Point* corners, int k, int y_
     }
 }
 
-// Calls visit(y, x_begin, x_end) for the pixels of a face on the rows [y_begin, y_end), each once. The polygon is a fan of
-// triangles; nearly always there is one.
+// Calls visit(y, x_begin, x_end) for the pixels of a face on the rows [y_begin, y_end), each once. The polygon is a fan
+// of triangles; nearly always there is one.
 template <class Visit>
 void for_each_span(const Coverage& c, const Point* corners, int y_begin, int y_end, Visit&& visit) {
     y_begin = std::max(y_begin, c.ymin);
@@ -450,8 +453,6 @@ struct Workspace {
     Counters count;
 };
 
-using Shaders = std::function<IShader&(int i, int thread)>;
-
 struct Pass {
     const Shaders& shader;
     const int nshaders;
@@ -489,7 +490,8 @@ struct Pass {
         return total;
     }
 
-    // The corner of a face, from those that were asked for last if it is there: neighbouring faces share their vertices.
+    // The corner of a face, from those that were asked for last if it is there: neighbouring faces share their
+    // vertices.
     const Vertex& vertex(IShader& own, int iface, int nthvert, std::vector<Vertex>& last) const {
         const int number = own.vertex_number(iface, nthvert);
         Vertex& v = last[number % last.size()];
@@ -560,8 +562,8 @@ struct Pass {
         });
     }
 
-    // Draws a face into the rows of a strip; where it is nearest, nearest (if given) gets its mark. Returns the number of
-    // samples.
+    // Draws a face into the rows of a strip; where it is nearest, nearest (if given) gets its mark. Returns the number
+    // of samples.
     long triangle(const Face& face, const Point* corners, int mark, int y_begin, int y_end, float* depth,
                   std::int32_t* nearest) const {
         std::int32_t numbers[lanes];
@@ -584,7 +586,8 @@ struct Pass {
         return covered;
     }
 
-    // Colours those pixels of a strip that have the face's mark, as many at once as there are lanes. Returns their number.
+    // Colours those pixels of a strip that have the face's mark, as many at once as there are lanes. Returns their
+    // number.
     long shade(const Face& face, int mark, IShader& own, int y_begin, int y_end, const std::int32_t* nearest) const {
         constexpr int most = 32 * lanes;  // pixels that are collected before they are coloured
         std::int32_t xs[most], ys[most];
@@ -656,15 +659,16 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImag
 
 // ---- shadows ----
 
-// The buffer knows depths at the centres of its texels only. Both terms say how much of a height above the fragment means
-// nothing; what stands higher than either throws a shadow.
+// The buffer knows depths at the centres of its texels only. Both terms say how much of a height above the fragment
+// means nothing; what stands higher than either throws a shadow.
 // - The receiver: its own plane, at the centre of the texel that the fragment lies in. If nothing is above it there the
 //   fragment is lit: no face shadows itself, at any angle.
-// - The caster: what is above may fall, on its way from there to the fragment, as far as to the next texel's depth. Along
-//   each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are lower, half.
-// And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most; coverage is snapped
-// by half a sub-pixel.
-coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored, const vec3 (&face)[3]) {
+// - The caster: what is above may fall, on its way from there to the fragment, as far as to the next texel's depth.
+//   Along each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are
+//   lower, half. And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most;
+//   coverage is snapped by half a sub-pixel.
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored,
+                   const vec3 (&face)[3]) {
     constexpr double depth_rounding = 1. / (1 << 14);
     const vec3 n = cross(face[1] - face[0], face[2] - face[0]);
     const vec2 slope{-n.x / n.z, -n.y / n.z};  // of the face's depth, per texel along x and y
@@ -673,7 +677,9 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
     const coord receiver = dot(slope, to_centre);
     if (!any(stored > sb_p.z + (receiver + rounding))) return receiver + rounding;
 
-    const auto depth = [&](double dx, double dy) { return shadowbuffer.at(vec<3, coord>{sb_p.x + dx, sb_p.y + dy, sb_p.z}); };
+    const auto depth = [&](double dx, double dy) {
+        return shadowbuffer.at(vec<3, coord>{sb_p.x + dx, sb_p.y + dy, sb_p.z});
+    };
     const auto fall = [&](const coord& a, const coord& b) {
         return min(abs(stored - a), abs(stored - b)) / select((a < stored) & (b < stored), coord(2), 1);
     };
@@ -694,8 +700,9 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
             corners_.push_back(project(to_screen * point(model.vert(corner / 3, corner % 3))));
     const int faces = static_cast<int>(corners_.size() / 3);
     const auto cell_of = [&](double v) { return v > 0 ? static_cast<int>(std::min(v, cells_ - 1.)) : 0; };  // NaN: 0
-    // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a face,
-    // the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of faces.
+    // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a
+    // face, the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of
+    // faces.
     constexpr double most_entries = 64;
     const auto box_cells = [&] {
         double sum = 0;
@@ -774,8 +781,9 @@ mask LightGrid::shadows(const vec<3, coord>& on_screen, int number) const {
     return real(dark) > 0;
 }
 
-// Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are the
-// barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls through.
+// Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are
+// the barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls
+// through.
 bool LightGrid::covers(int face, const vec3& p) const {
     const vec3* const q = &corners_[std::size_t{3} * face];
     const vec3 a = q[0] - p, b = q[1] - p, c = q[2] - p;
@@ -784,9 +792,9 @@ bool LightGrid::covers(int face, const vec3& p) const {
     if (!left && !right) return false;
     const double above = (u * a.z + v * b.z + w * c.z) * (left ? 1 : -1);  // height over p times twice the area
     if (!(above > 0)) return false;
-    // A face in the plane of p's own, its neighbour on a flat wall, is above p by rounding alone. Corners and p are known to
-    // eps of their size (cells_ sideways, zmax_ in height): with r and h the largest of the differences sideways and in
-    // height, an area is off by 4 r (cells_ + r) eps, and the sum by what follows.
+    // A face in the plane of p's own, its neighbour on a flat wall, is above p by rounding alone. Corners and p are
+    // known to eps of their size (cells_ sideways, zmax_ in height): with r and h the largest of the differences
+    // sideways and in height, an area is off by 4 r (cells_ + r) eps, and the sum by what follows.
     constexpr double eps = std::numeric_limits<double>::epsilon();
     double r = 0, h = 0;
     for (const vec3& d : {a, b, c}) r = std::max({r, std::fabs(d.x), std::fabs(d.y)}), h = std::max(h, std::fabs(d.z));

@@ -1,10 +1,10 @@
-// our_gl.h: the pipeline, from a face to its pixels: cameras, shaders, the z-buffer, drawing, and what shadows need.
-// It knows nothing of files or of what a shader computes. Lesson paragraphs: lookat, projection, viewport, rasterization.
+// our_gl.h: the pipeline, from a face to its pixels: cameras, shaders, the z-buffer, drawing, and what shadows need. It
+// knows nothing of files or of what a shader computes. Lesson paragraphs: lookat, projection, viewport, rasterization.
 //
 // Spaces, in the order in which a corner passes through them:
 //     object --ModelView--> eye --Projection--> clip --Viewport--> screen (homogeneous) --divide by w--> screen
-// Right-handed; the viewer looks down -z, so a larger z is nearer. On the screen x and y are in pixels, pixel (0,0) is the
-// bottom-left one and its centre is (0.5, 0.5); z is in [0, screen_depth] for what lies in the cube [-1,1]^3.
+// Right-handed; the viewer looks down -z, so a larger z is nearer. On the screen x and y are in pixels, pixel (0,0) is
+// the bottom-left one and its centre is (0.5, 0.5); z is in [0, screen_depth] for what lies in the cube [-1,1]^3.
 #pragma once
 #include "geometry.h"
 #include "model.h"
@@ -23,8 +23,8 @@ constexpr double screen_depth = 2000;  // what the viewport makes of the z range
 // where eye and center are the same point, the view is along -z.
 mat4 lookat(const vec3& eye, const vec3& center, const vec3& up);
 
-// Central projection onto the plane z = 0 for an eye at z = -1/c: the identity with c at row 3, column 2, so w = 1 + c z.
-// c = 0 is the orthographic camera.
+// Central projection onto the plane z = 0 for an eye at z = -1/c: the identity with c at row 3, column 2, so w = 1 + c
+// z. c = 0 is the orthographic camera.
 mat4 projection(double c);
 
 mat4 translation(const vec3& by);
@@ -40,8 +40,8 @@ struct Camera {
     mat4 ModelView = mat4::identity(), Projection = mat4::identity(), Viewport = mat4::identity();
     mat4 to_clip() const { return Projection * ModelView; }
     mat4 to_screen() const { return Viewport * to_clip(); }
-    // The inverse of to_screen(), factor by factor: the product itself is singular to working precision for an eye within
-    // 1e-15 of center. Each factor must have an inverse.
+    // The inverse of to_screen(), factor by factor: the product itself is singular to working precision for an eye
+    // within 1e-15 of center. Each factor must have an inverse.
     mat4 from_screen() const {
         return invert(ModelView).value() * (invert(Projection).value() * invert(Viewport).value());
     }
@@ -55,8 +55,8 @@ Camera fitted(const Camera& camera, const std::vector<Model>& models, int size);
 
 constexpr int max_size = 16384;  // pixels a side; the range of the integer edge functions rests on it
 
-// Depth on the screen, larger is nearer, minus infinity where nothing was drawn: every cell, the first one too. Rows from
-// the bottom up.
+// Depth on the screen, larger is nearer, minus infinity where nothing was drawn: every cell, the first one too. Rows
+// from the bottom up.
 class DepthBuffer {
 public:
     static constexpr float nothing = -std::numeric_limits<float>::infinity();
@@ -124,8 +124,8 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
         [&](int i) { return varying[0][i] * bar.x + varying[1][i] * bar.y + varying[2][i] * bar.z; });
 }
 
-// The texels (floor(u*w), floor(v*h)) of a picture, one a lane: nearest, wrapped round. [i] is their channel i. uv finite,
-// of any size.
+// The texels (floor(u*w), floor(v*h)) of a picture, one a lane: nearest, wrapped round. [i] is their channel i. uv
+// finite, of any size.
 class Texels {
 public:
     INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
@@ -158,8 +158,8 @@ private:
     pack<std::int32_t> bytes_;  // four from the texel on, the first one lowest: up to three may lie beyond the picture
 };
 
-// base^exponent for integers from 0 to 255, by repeated squaring: the same product in the same order everywhere, which a
-// library's pow does not promise.
+// base^exponent for integers from 0 to 255, by repeated squaring: the same product in the same order everywhere, which
+// a library's pow does not promise.
 INLINED real power(real base, const real& exponent) {
     const pack<std::int32_t> e = to_int(exponent);
     real result = 1;
@@ -189,21 +189,23 @@ void use_threads(int n);
 int thread_count();
 
 // Calls work(i, thread) once for each i in [0,n), on as many threads as can be had, with a thread number below
-// thread_count(). In what order is not defined. What one of the calls throws is thrown here, once all have ended. Not to
-// be called by two threads at once, nor by work itself.
+// thread_count(). In what order is not defined. What one of the calls throws is thrown here, once all have ended. Not
+// to be called by two threads at once, nor by work itself.
 void parallel_for(int n, const std::function<void(int i, int thread)>& work);
 
-// A pass: draws the faces of all shaders. Into a z-buffer go the depths of what is nearest, whatever it held before (the
-// first drawn wins a tie). Into a picture of three or four channels go the colours: fragment() is called once for every
-// pixel that is seen, however many faces lie behind it, and the rest is black. shader(i, thread) is the thread's own copy
-// of the i-th.
-Counters draw(const std::function<IShader&(int i, int thread)>& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer);
-Counters draw(const std::function<IShader&(int i, int thread)>& shader, int nshaders, const mat4& Viewport, TGAImage& picture);
+// A pass: draws the faces of all shaders. Into a z-buffer go the depths of what is nearest, whatever it held before
+// (the first drawn wins a tie). Into a picture of three or four channels go the colours: fragment() is called once for
+// every pixel that is seen, however many faces lie behind it, and the rest is black. shader(i, thread) is the thread's
+// own copy of the i-th.
+using Shaders = std::function<IShader&(int i, int thread)>;
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer);
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImage& picture);
 
 template <class Shader, class Target>
 Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& target) {
     std::vector<std::vector<Shader>> own(thread_count(), shaders);
-    return draw([&](int i, int thread) -> IShader& { return own[thread][i]; }, static_cast<int>(shaders.size()), Viewport, target);
+    const auto shader = [&](int i, int thread) -> IShader& { return own[thread][i]; };
+    return draw(shader, static_cast<int>(shaders.size()), Viewport, target);
 }
 
 // ---- shadows ----
@@ -214,8 +216,8 @@ Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& 
 coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored,
                    const vec3 (&face)[3]);
 
-// The exact shadow: faces sorted into the cells of a grid on the light's screen, so that the few that may stand between a
-// point and the light are found at once. No resolution, no bias: whether one does is decided on the face itself.
+// The exact shadow: faces sorted into the cells of a grid on the light's screen, so that the few that may stand between
+// a point and the light are found at once. No resolution, no bias: whether one does is decided on the face itself.
 class LightGrid {
 public:
     LightGrid() = default;

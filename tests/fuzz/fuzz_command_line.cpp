@@ -1,6 +1,6 @@
-// fuzz_command_line.cpp: any arguments. They are refused with status 2, or the program goes on with them: to a file that
-// does not exist, which is status 1, or through both passes on a small model. The input is the arguments with zero bytes
-// between them or, where it has none, newlines.
+// fuzz_command_line.cpp: any arguments. They are refused with status 2, or the program goes on with them: to a file
+// that does not exist, which is status 1, or through both passes on a small model. The input is the arguments with zero
+// bytes between them or, where it has none, newlines.
 #include "fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -34,7 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (is_option && !is_flag) drawing.push_back(words[++i]);
         else if (!is_option && i > 0) drawing.back() = model.path().string();
     }
-    for (const char* word : {"--size", "9x7", "--shadow-size", "5", "--threads", "2", "--quiet", "-o"}) drawing.push_back(word);
+    for (const char* word : {"--size", "9x7", "--shadow-size", "5", "--frames", "1", "--threads", "2", "--quiet", "-o"})
+        drawing.push_back(word);
     drawing.push_back(folder.path().string());
     drawing.push_back(model.path().string());
     REQUIRE(run_umbra(drawing) == 0);

@@ -1,6 +1,6 @@
 // stiff_test.cpp: inputs at the edges of the arithmetic, and what must come out of each: pixels counted, bytes
 // compared, shadows held against the ray caster. It knows nothing of how a picture should look otherwise.
-#include "our_gl.h"
+#include "drawing.h"
 #include "random.h"
 #include "run.h"
 #include "scenes.h"
@@ -106,22 +106,20 @@ void check_no_acne(const std::string& options, double s = 1) {
 }
 
 // The pipeline itself, for what only clip space can say: three corners a face.
-struct Drawing {
+struct Seen {
     std::vector<int> faces;  // the nearest at each pixel, -1 where there is none; rows from the bottom up
     std::vector<double> z;   // its depth on the screen
     long drawn() const { return std::count_if(faces.begin(), faces.end(), [](int face) { return face >= 0; }); }
 };
 
-Drawing drawing(const std::vector<vec4>& clip, int width, int height) {
-    struct Corners final : IShader {
-        const std::vector<vec4>& clip;
-        explicit Corners(const std::vector<vec4>& c) : clip(c) {}
-        vec4 vertex(int face, int corner) override { return clip[face * 3 + corner]; }
-    };
-    DepthBuffer z(width, height);
-    FaceBuffer faces(width, height);
-    draw_depth(static_cast<int>(clip.size() / 3), Corners(clip), viewport(0, 0, width, height), z, &faces, 0, 1);
-    return {{faces.row(0), faces.row(0) + width * height}, {z.row(0), z.row(0) + width * height}};
+Seen seen(const std::vector<vec4>& clip, int width, int height) {
+    const Drawing d = drawing(clip, width, height);
+    Seen s;
+    for (int i = 0; i < width * height; i++) {
+        s.faces.push_back(d.face(i % width, i / width));
+        s.z.push_back(d.z.row(i / width)[i % width]);
+    }
+    return s;
 }
 
 }  // namespace
@@ -356,9 +354,9 @@ TEST("triangles: w at most zero at one, two and three corners") {
             clip.push_back({r.in(-2, 2), r.in(-2, 2), r.in(-1, 1) * w, w});
             for (int row = 0; row < 3; row++) corners[row][i] = clip[i][row < 2 ? row : 3];
         }
-        const Drawing d = drawing(clip, 16, 16);
+        const Seen d = seen(clip, 16, 16);
         drawn_by[behind] += d.drawn();
-        const Wide area = std::fabs(determinant(corners));
+        const Wide area = std::fabs(dot(corners[0], cross(corners[1], corners[2])));
         const auto inverse = invert(corners);
         for (int pixel = 0; pixel < 256 && inverse; pixel++) {
             const auto e = *inverse * vec<3, Wide>{(pixel % 16 + Wide(.5)) / 8 - 1, (pixel / 16 + Wide(.5)) / 8 - 1, 1};
@@ -375,12 +373,12 @@ TEST("triangles: corners exactly on the near plane") {
     constexpr double near = 1. / (1 << 22);
     for (const double z : {-near, 0., near})
         for (const double w : {near, std::nextafter(near, 0), std::nextafter(near, 1)}) {
-            const Drawing d = drawing({{-w, -w, z, w}, {3 * w, -w, z, w}, {-w, 3 * w, z, w}}, 32, 32);
+            const Seen d = seen({{-w, -w, z, w}, {3 * w, -w, z, w}, {-w, 3 * w, z, w}}, 32, 32);
             CHECK_EQ(d.drawn(), w < near ? 0 : 1024);
         }
     // One corner on it, straight above the picture: the same pixels as from a corner that is there with w = 1.
-    const Drawing on = drawing({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3 * near, 0, near}}, 32, 32);
-    CHECK(on.faces == drawing({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3, 0, 1}}, 32, 32).faces);
+    const Seen on = seen({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3 * near, 0, near}}, 32, 32);
+    CHECK(on.faces == seen({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3, 0, 1}}, 32, 32).faces);
 }
 
 // A square between pixels' centres: those on its left and top edges are its own, those on the others are not.
@@ -395,15 +393,15 @@ TEST("triangles: corners exactly on pixels' centres") {
 // 4096 pixels around the picture are the guard band; with 64 pixels they are at -129 and 129.
 TEST("triangles: corners exactly on the guard band, a hair and far beyond it") {
     const auto around = [](double far) {
-        return drawing({{-far, -far, far / 258, 1}, {far, -far, -far / 258, 1}, {0, far, 0, 1}}, 64, 64);
+        return seen({{-far, -far, far / 258, 1}, {far, -far, -far / 258, 1}, {0, far, 0, 1}}, 64, 64);
     };
     for (const double far : {129., std::nextafter(129., 200.), 130., 1e4, 1e8}) {
-        const Drawing on = around(129), beyond = around(far);
+        const Seen on = around(129), beyond = around(far);
         CHECK_EQ(beyond.drawn(), 4096);
         for (int i = 0; i < 4096; i++) CHECK_NEAR(beyond.z[i], on.z[i], 0x1p-13);  // one step of a float
     }
     // An edge of the triangle on the band's very border: nothing of the picture.
-    CHECK_EQ(drawing({{-129, -129, 0, 1}, {-129, 129, 0, 1}, {-130, 0, 0, 1}}, 64, 64).drawn(), 0);
+    CHECK_EQ(seen({{-129, -129, 0, 1}, {-129, 129, 0, 1}, {-130, 0, 0, 1}}, 64, 64).drawn(), 0);
 }
 
 // A float in [1024,2048] has steps of 2^-13, which is 1.22e-7 of z: layers farther apart are told apart. Nearer ones
@@ -417,7 +415,7 @@ TEST("depth: two layers 1e-2 to 1e-9 apart, in either order") {
                     for (const int face : {0, 1})
                         for (const vec2& p : {vec2{-1, -1}, vec2{3, -1}, vec2{-1, 3}})
                             clip.push_back({p.x, p.y, z + (face == nearer ? gap : 0) + slope * .1 * (p.x + p.y), 1});
-                    const Drawing d = drawing(clip, 16, 16);
+                    const Seen d = seen(clip, 16, 16);
                     if (gap >= 1.3e-7 || nearer == 0) CHECK(d.faces == std::vector<int>(256, nearer));
                 }
 }
@@ -535,7 +533,7 @@ TEST("matrices: the light's camera as the scene moves away by 1 to 1e12") {
         const Scene f(yard({1, 1, 1}, by));
         std::vector<Model> models(1, Model(f / "m.obj"));
         models[0].move(-by);
-        return fitted_camera(models, {1, 1, .5}, {0, 1, 0}, 800).object_to_screen();
+        return fitted({lookat({1, 1, .5}, {}, {0, 1, 0})}, models, 800).to_screen();
     };
     for (const double d : {1., 1e2, 1e4, 1e6, 1e9, 1e12}) CHECK(light_matrix({d, -2 * d, d}) == light_matrix({}));
 }

@@ -22,7 +22,7 @@ if(CMAKE_SCRIPT_MODE_FILE)
     endif()
     list(TRANSFORM INCLUDES PREPEND -I)
     list(TRANSFORM DEFINITIONS PREPEND -D)
-    execute_process(COMMAND ${COMPILER} -std=c++20 -O1 -ffp-contract=off -pthread ${INCLUDES} ${DEFINITIONS}
+    execute_process(COMMAND ${COMPILER} -std=c++20 -O1 ${OPTIONS} -pthread ${INCLUDES} ${DEFINITIONS}
                             ${FOLDER}/${name}/${file} ${MAIN_OBJECT} ${LIBRARIES} -o ${FOLDER}/${name}/umbra
                     COMMAND_ERROR_IS_FATAL ANY)
     execute_process(COMMAND ${GATE} ${FOLDER}/${name}/umbra OUTPUT_VARIABLE said RESULT_VARIABLE status)
@@ -37,22 +37,23 @@ else()
              COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DSOURCE=${PROJECT_SOURCE_DIR} -DGATE=$<TARGET_FILE:error_gate>
                      -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/mutants -DCOMPILER=${CMAKE_CXX_COMPILER}
                      "-DINCLUDES=$<TARGET_PROPERTY:umbra,INCLUDE_DIRECTORIES>"
+                     "-DOPTIONS=$<TARGET_PROPERTY:umbra,COMPILE_OPTIONS>"
                      "-DDEFINITIONS=$<TARGET_PROPERTY:umbra,COMPILE_DEFINITIONS>"
-                     -DMAIN_OBJECT=$<TARGET_OBJECTS:umbra> "-DLIBRARIES=$<TARGET_FILE:truth>;$<TARGET_FILE:our_gl>"
+                     -DMAIN_OBJECT=$<TARGET_OBJECTS:umbra> -DLIBRARIES=$<TARGET_FILE:our_gl>
                      -P ${PROJECT_SOURCE_DIR}/tests/report/mutants.cmake)
     set_tests_properties(${name} PROPERTIES SKIP_REGULAR_EXPRESSION "skipped: the lesson was edited")
   endfunction()
 endif()
 
 umbra_mutant(mutant_half_texel main.cpp
-  "shadowbuffer->at(p.x + dx, p.y + dy)"
-  "shadowbuffer->at(p.x + dx - .5, p.y + dy - .5)")
-umbra_mutant(mutant_half_bias main.cpp
-  "p.z + dot(g, to_centre) + rounding"
-  "p.z + .5 * dot(g, to_centre) + rounding")
-umbra_mutant(mutant_no_caster_slope main.cpp
-  "/ (a < stored && b < stored ? 2 : 1)"
-  "* 0")
+  "const coord stored = shadow.shadowbuffer.at(sb_p)"
+  "const coord stored = shadow.shadowbuffer.at(vec<3, coord>{sb_p.x - .5, sb_p.y - .5, sb_p.z})")
+umbra_mutant(mutant_half_bias our_gl.cpp
+  "receiver = dot(slope, to_centre)"
+  "receiver = .5 * dot(slope, to_centre)")
+umbra_mutant(mutant_no_caster_slope our_gl.cpp
+  "max(receiver, caster)"
+  "receiver")
 umbra_mutant(mutant_loose_fit main.cpp
-  "Camera light = fitted_camera(scene.models, opt.light, opt.up, size)"
-  "Camera light{lookat(opt.light, {}, opt.up), projection(0), middle_viewport(size, size)}")
+  "if (!classic) light = fitted(light, models, size)"
+  "")

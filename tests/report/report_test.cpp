@@ -61,7 +61,7 @@ std::vector<Triangle> floor_mesh(int n, double crease) {
 // ... under a disk that faces the light, out of sight, so that the shadow is a circle for the light.
 constexpr double radius = .8;
 RayCaster disk_over(std::vector<Triangle> mesh) {
-    const vec3 l = normalized(light), x = normalized(cross({0, 0, 1}, l)), y = cross(l, x), middle = l * 20;
+    const vec3 l = normalized(light), x = normalized(cross(vec3{0, 0, 1}, l)), y = cross(l, x), middle = l * 20;
     const auto at = [&](int i) { return middle + (x * std::cos(pi * i / 32) + y * std::sin(pi * i / 32)) * radius; };
     for (int i = 0; i < 64; i++) mesh.push_back({middle, at(i), at(i + 1)});
     return RayCaster(mesh);

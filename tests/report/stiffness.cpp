@@ -111,7 +111,8 @@ struct Corners {
         };
         return worst(place, {-1, -1, 0}, {1, 1, 0}, size / 8.L, .75L * size);
     }
-    // The program's way: the model moved, the light's camera fitted to it. All corners fill the light's screen.
+    // The program's way: the same in double, the model moved, the light's camera fitted to it. All corners fill the
+    // light's screen.
     double here(const Program& umbra) const {
         Obj scene;
         for (std::size_t i = 0; i < at.size(); i++)
@@ -119,12 +120,16 @@ struct Corners {
         std::vector<Model> models(1, Model(file(umbra, scene.text())));
         models[0].move(-center);
         if (models[0].nfaces() != static_cast<int>(at.size())) throw std::logic_error("a corner is lost");
-        const mat4 uniform_Mshadow = fitted_camera(models, to_light, {0, 1, 0}, size).object_to_screen();
+        const Camera viewer{lookat(eye - center, {}, {0, 1, 0}), projection(-1 / norm(eye - center)),
+                            middle_viewport(size, size)};
+        const Camera light = fitted({lookat(to_light, {}, {0, 1, 0})}, models, size);
+        const mat4 uniform_Mshadow = light.to_screen() * viewer.from_screen();
         auto low = exact[0], high = low;
         for (const auto& p : exact)
             for (int i = 0; i < 2; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
         const auto place = [&](std::size_t i) {
-            return project(uniform_Mshadow * point(models[0].vert(static_cast<int>(i), 0)));
+            const vec3 screen = project(viewer.to_screen() * point(models[0].vert(static_cast<int>(i), 0)));
+            return project(uniform_Mshadow * point(screen));
         };
         return worst(place, low, high, 0, size);
     }
@@ -150,6 +155,8 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     family("scene moved away by", "Mshadow: pixels", sub_pixel, distances,
            [&](double d) { return moved(d).here(umbra); });
     family("eye's distance (1/c)", classic, sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
+    family("eye's distance (1/c)", "Mshadow: pixels", sub_pixel, eyes,
+           [&](double d) { return seen_from(d).here(umbra); });
 
     const std::string plane = file(umbra, floor_of(1));
     for (const Arguments& method : {Arguments{"--bias", "43.34"}, {"--shadow", "map"}, {"--shadow", "exact"}})

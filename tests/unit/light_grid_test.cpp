@@ -1,4 +1,5 @@
-// light_grid_test.cpp: the grid of casters finds what a look at every face finds, and no face shadows its neighbours in a plane.
+// light_grid_test.cpp: the grid of casters finds what a look at every face finds, and no face shadows its neighbours in
+// a plane.
 #include "check.h"
 #include "files.h"
 #include "our_gl.h"
@@ -23,7 +24,10 @@ Model model_of(const std::vector<vec3>& corners) {
 template <class Height>
 std::vector<vec3> surface(int n, Height&& z) {
     std::vector<vec3> corners;
-    const auto at = [&](int i, int j) { const double x = 2. * i / n - 1, y = 2. * j / n - 1; return vec3{x, y, z(x, y)}; };
+    const auto at = [&](int i, int j) {
+        const double x = 2. * i / n - 1, y = 2. * j / n - 1;
+        return vec3{x, y, z(x, y)};
+    };
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
             for (const vec3& v : {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1)})
@@ -91,7 +95,8 @@ TEST("the grid agrees with a look at every face") {
                 using wide = long double;
                 const wide x = wide(b.x) * c.y - wide(b.y) * c.x, y = wide(c.x) * a.y - wide(c.y) * a.x,
                            z = wide(a.x) * b.y - wide(a.y) * b.x, area = x + y + z;
-                const wide height = (x * a.z + y * b.z + z * c.z) / area, least = std::min({x / area, y / area, z / area});
+                const wide height = (x * a.z + y * b.z + z * c.z) / area;
+                const wide least = std::min({x / area, y / area, z / area});
                 shadowed |= least > 0 && height > 0;
                 close |= std::fabs(least) < 1e-9L || (least > 0 && std::fabs(height) < 1e-9L);
             }
@@ -101,12 +106,13 @@ TEST("the grid agrees with a look at every face") {
 }
 
 TEST("no light falls through a seam, no flat surface shadows itself") {
-    // A tilted plane under another one. Points exactly on edges and corners of the upper one are in its shadow; points of
-    // the upper one that lie on its own edges are lit, though the neighbours are above them by rounding alone.
+    // A tilted plane under another one. Points exactly on edges and corners of the upper one are in its shadow; points
+    // of the upper one that lie on its own edges are lit, though the neighbours are above them by rounding alone.
     for (const double tilt : {0., .1, 3., 1e3, 1e6}) {
         std::vector<vec3> corners = surface(16, [&](double x, double y) { return tilt * (x + .3 * y) + 1 + tilt; });
         const std::size_t upper = corners.size();
-        for (const vec3& v : surface(16, [&](double x, double y) { return tilt * (x + .3 * y) - 1 - tilt; })) corners.push_back(v);
+        for (const vec3& v : surface(16, [&](double x, double y) { return tilt * (x + .3 * y) - 1 - tilt; }))
+            corners.push_back(v);
         const std::vector<Model> models{model_of(corners)};
         const int cells = 20;
         const Camera light = light_on(models, {0, 0, 1}, cells);

@@ -54,7 +54,8 @@ TEST("Mshadow there and back") {
     Random r(3);
     for (int k = 0; k < 5000; k++) {
         const vec3 eye = normalized(r.point(1)) * r.in(2, 10), light = r.point(1), center = r.point(.5);
-        const Camera a{lookat(eye + center, center, {0, 1, 0}), projection(-1 / norm(eye)), viewport(100, 100, 600, 600)};
+        const Camera a{lookat(eye + center, center, {0, 1, 0}), projection(-1 / norm(eye)),
+                       viewport(100, 100, 600, 600)};
         const Camera b{lookat(center + light, center, {0, 1, 0}), projection(0), viewport(50, 50, 300, 300)};
         const mat4 to = b.to_screen() * a.from_screen(), back = a.to_screen() * b.from_screen();
         const vec3 p = center + r.point(.8), s = project(a.to_screen() * point(p));
@@ -68,7 +69,8 @@ TEST("every visible pixel is shaded once, hidden faces not at all") {
     std::vector<vec4> clip;
     for (int k = 0; k < 300; k++)
         for (int i = 0; i < 3; i++) clip.push_back(point(r.point(1)));
-    for (const vec3& v : {vec3{-3, -3, -.9}, vec3{3, -3, -.9}, vec3{0, 5, -.9}}) clip.push_back(point(v));  // behind all
+    for (const vec3& v : {vec3{-3, -3, -.9}, vec3{3, -3, -.9}, vec3{0, 5, -.9}})  // behind all
+        clip.push_back(point(v));
     struct Counting final : ClipShader {
         std::vector<std::atomic<int>>& calls;
         Counting(const std::vector<vec4>& c, std::vector<std::atomic<int>>& n) : ClipShader(c), calls(n) {}
@@ -87,7 +89,7 @@ TEST("every visible pixel is shaded once, hidden faces not at all") {
         for (int x = 0; x < 64; x++)
             if (d.drawn(x, y)) visible[d.face(x, y)]++;
     for (int i = 0; i < 301; i++)  // as few batches as each strip of rows allows
-        CHECK(calls[i] * lanes >= visible[i] && calls[i] <= visible[i] / lanes + 4 && (calls[i] > 0) == (visible[i] > 0));
+        CHECK(calls[i] * lanes >= visible[i] && calls[i] <= visible[i] / lanes + 4 && calls[i] <= visible[i]);
 }
 
 TEST("what is not drawn is at minus infinity, every cell of it, and outside of the buffer too") {
@@ -167,7 +169,8 @@ TEST("depth and barycentric coordinates against long double, w from 1e-3 to 1e3"
 TEST("a floor through the eye's plane is cut, not wrapped round") {
     // The plane y = -1 from far ahead to behind the eye at (0,0,1): on the screen it fills what is below the horizon.
     const auto at = [](double x, double z) { return projection(-1) * point(vec3{x, -1, z}); };
-    const Drawing d = drawing({at(-1e4, 50), at(1e4, 50), at(1e4, -1e4), at(-1e4, 50), at(1e4, -1e4), at(-1e4, -1e4)}, 64, 64);
+    const vec4 a = at(-1e4, 50), b = at(1e4, 50), c = at(1e4, -1e4), e = at(-1e4, -1e4);
+    const Drawing d = drawing({a, b, c, a, c, e}, 64, 64);
     for (int y = 0; y < 64; y++)
         for (int x = 0; x < 64; x++) CHECK_EQ(d.drawn(x, y), y < 32);
 }
@@ -180,7 +183,10 @@ TEST("nothing behind the eye is drawn, nothing outside is touched") {
     for (int k = 0; k < 20000; k++) {  // the sanitizers watch the buffers
         std::vector<vec4> clip;
         const double size = std::exp(r.in(-3, 12));
-        for (int i = 0; i < 3; i++) clip.push_back({r.in(-size, size), r.in(-size, size), r.in(-size, size), r.in(-2, 2)});
+        for (int i = 0; i < 3; i++) {
+            const vec3 p = r.point(size);
+            clip.push_back({p.x, p.y, p.z, r.in(-2, 2)});
+        }
         const Drawing d = drawing(clip, 1 + k % 9, 1 + k % 7);
         for (int y = 0; y < d.height(); y++)
             for (int x = 0; x < d.width(); x++) CHECK(!std::isnan(d.z.row(y)[x]));
@@ -224,7 +230,10 @@ TEST("parallel_for calls each number once, and throws what a call throws") {
         CHECK(in_range);
         parallel_for(0, [&](int, int) { in_range = false; });
         CHECK(in_range);
-        CHECK_THROWS(parallel_for(50, [](int i, int) { if (i == 31) throw std::runtime_error("thirty-one"); }), "thirty-one");
+        const auto throwing = [](int i, int) {
+            if (i == 31) throw std::runtime_error("thirty-one");
+        };
+        CHECK_THROWS(parallel_for(50, throwing), "thirty-one");
     }
 }
 
@@ -257,7 +266,8 @@ TEST("depth as a picture: nearest white, nothing black") {
     CHECK_EQ(int{depth_picture(z).get(0, 0)[0]}, 255);
 }
 
-// Acne is a face that shadows itself. A face alone in the buffer is looked up at random points of it, at all its slopes.
+// Acne is a face that shadows itself. A face alone in the buffer is looked up at random points of it, at all its
+// slopes.
 TEST("with the derived bias no face shadows itself, with a half of it some do") {
     Random r(8);
     long acne = 0, halved = 0;

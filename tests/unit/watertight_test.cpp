@@ -19,14 +19,16 @@ Drawing tessellated(const mat4& M, const mat4& Viewport, int cells, Random& r) {
             const vec4 q[4] = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};
             const int a = r.below(4), b = (a + 1) % 4, c = (a + 2) % 4, d = (a + 3) % 4;
             const bool turned = r.below(2);
-            for (const int k : {a, turned ? c : b, turned ? b : c, c, turned ? a : d, turned ? d : a}) clip.push_back(q[k]);
+            for (const int k : {a, turned ? c : b, turned ? b : c, c, turned ? a : d, turned ? d : a})
+                clip.push_back(q[k]);
         }
     }
     return drawing(ClipShader(clip), W, H, Viewport);
 }
 
 // Where the pixel centre lies in the square, from the inverse transform: 1 inside, 0 outside, -1 within 1/4096 pixel of
-// its outline: snapping moves a corner by up to 2^-17 pixel, and clipping by the near plane by 2^-13 (w_near in our_gl.cpp).
+// its outline: snapping moves a corner by up to 2^-17 pixel, and clipping by the near plane by 2^-13 (w_near in
+// our_gl.cpp).
 int expected(const mat4& M, const mat4& Viewport, int cells, int x, int y) {
     const mat4 s = Viewport * M;
     const mat3 h{{{s[0].x, s[0].y, s[0].w}, {s[1].x, s[1].y, s[1].w}, {s[3].x, s[3].y, s[3].w}}};
@@ -72,7 +74,8 @@ TEST("cells on integers and halves, from .05 to 64 pixels") {
     Random r(1);
     for (const double cell : {.05, .0625, .1, .25, .3, .5, 1., 1.5, 2., 3.7, 8., 16., 64.})
         for (const double at : {0., .5, 10., 10.5, -3.5})
-            check_once(pixels * scaled(cell, at, at), viewport(0, 0, W, H), std::min(64, static_cast<int>(100 / cell) + 1), r);
+            check_once(pixels * scaled(cell, at, at), viewport(0, 0, W, H),
+                       std::min(64, static_cast<int>(100 / cell) + 1), r);
 }
 
 TEST("a thousand random rotations, shears and perspectives") {
@@ -138,7 +141,8 @@ TEST("100 000 random triangles against a test of every pixel by itself") {
                 bool inside = area != 0;
                 for (int i = 0; i < 3 && inside; i++) {
                     const int j = (i + 1) % 3;
-                    const wide e = (ix[j] - ix[i]) * (py * 65536 + 32768 - iy[i]) - (iy[j] - iy[i]) * (px * 65536 + 32768 - ix[i]);
+                    const wide e = (ix[j] - ix[i]) * (py * 65536 + 32768 - iy[i]) -
+                                   (iy[j] - iy[i]) * (px * 65536 + 32768 - ix[i]);
                     const bool left = iy[j] < iy[i], top = iy[j] == iy[i] && ix[j] < ix[i];
                     inside = e > 0 || (e == 0 && (left || top));
                 }
