@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <stdexcept>
@@ -92,57 +93,68 @@ TGAImage depth_picture(const DepthBuffer& depths) {
 
 namespace {
 
-// Threads that wait for work, which is given out in rounds. Who gives it out works too. Waiting for an atomic spins for
-// a moment before it sleeps, which is quicker than a condition variable: a pass takes a millisecond or two.
+// Threads that wait for work, which is given out in rounds. Who gives it out works too. (A condition variable, because
+// waiting for an atomic hung under mingw once in a dozen runs.)
 class Pool {
 public:
     explicit Pool(int threads) {
         try {
-            for (int me = 1; me < threads; me++) others_.emplace_back([this, me] { wait_for_work(me); });
+            for (int me = 1; me < threads; me++) others_.emplace_back([this, me] { work_in_rounds(me); });
         } catch (const std::system_error&) {
             // no more threads to be had: those that run share the work
         }
     }
     ~Pool() {
         work_ = nullptr;
-        next_round();
+        change([this] { round_++; });
     }
 
     void run(int n, const std::function<void(int, int)>& work) {
         work_ = &work, n_ = n, next_ = 0, error_ = nullptr;
-        working_ = static_cast<int>(others_.size());
-        next_round();
+        change([this] { working_ = static_cast<int>(others_.size()), round_++; });
         share(0);
-        for (int left; (left = working_) > 0;) working_.wait(left);
+        wait_for([this] { return working_ == 0; });
         if (error_) std::rethrow_exception(error_);
     }
 
 private:
-    void next_round() {
-        round_++;
-        round_.notify_all();
-    }
     void share(int me) {
         try {
             for (int i; (i = next_++) < n_;) (*work_)(i, me);
         } catch (...) {
-            const std::lock_guard lock(error_mutex_);
+            const std::lock_guard lock(mutex_);
             error_ = std::current_exception();
         }
     }
-    void wait_for_work(int me) {
+    void work_in_rounds(int me) {
         for (int round = 0;; round++) {
-            round_.wait(round);
+            wait_for([&] { return round_ != round; });
             if (!work_) return;
             share(me);
-            if (--working_ == 0) working_.notify_one();
+            change([this] { working_--; });
         }
+    }
+    template <class F>
+    void change(F&& f) {
+        {
+            const std::lock_guard lock(mutex_);
+            f();
+        }
+        changed_.notify_all();
+    }
+    template <class F>
+    void wait_for(F&& ready) {
+        for (int i = 0; i < 4000; i++)  // some microseconds: often sooner than to sleep and be woken up
+            if (ready()) return;
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, ready);
     }
 
     const std::function<void(int, int)>* work_ = nullptr;
     int n_ = 0;
     std::atomic<int> next_ = 0, working_ = 0, round_ = 0;
-    std::mutex error_mutex_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
     std::exception_ptr error_;
     std::vector<std::jthread> others_;  // last: they end before what they use
 };
