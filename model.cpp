@@ -6,13 +6,14 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
-#include <exception>
+#include <future>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -28,10 +29,13 @@ namespace {
 
 using Corner = Model::Corner;
 
-constexpr std::size_t to_size(int n) { return static_cast<std::size_t>(n); }
-constexpr int to_int(std::size_t n) {
-    return static_cast<int>(n);
-}  // every array here is shorter than 2^31, see max_bytes
+// A vertex takes 8 bytes of text, a face's corner 2: no array made from so much text has 2^31 elements.
+constexpr std::uintmax_t max_bytes = std::uintmax_t{1} << 32;
+
+template <typename T>
+int count(const std::vector<T>& array) {
+    return static_cast<int>(array.size());
+}
 
 // ---- text, line by line and word by word ----
 
@@ -42,278 +46,164 @@ std::string printable(std::string_view text) {
         if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
     return text.size() > 60 ? out + "..." : out;
 }
-std::string in_quotes(std::string_view text) { return "'" + printable(text) + "'"; }
+std::string in_quotes(std::string_view text) { return std::string("'").append(printable(text)).append("'"); }
 
-// A text file seen through a window that holds whole lines and grows with the longest. So a big file costs neither its
-// size in memory nor the cache misses of being written there and read again: a quarter of the time of loading a big
-// mesh.
-//
-// A line that ends in '\' goes on in the next one. In a comment it does not: a stray '\' there must not swallow a
-// vertex.
-class TextFile {
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\0'; }  // '\0': see join_lines
+
+// A line that ends in '\' goes on in the next one; not where it holds a '#', since a stray '\' in a comment must not
+// swallow a vertex. Both bytes become blanks, the newline '\0', which no text has: so lines can still be counted.
+void join_lines(std::string& text) {
+    for (std::size_t at = 0; (at = text.find('\\', at)) != text.npos; at++) {
+        std::size_t newline = at + 1;
+        while (is_blank(text[newline])) newline++;
+        if (text[newline] != '\n') continue;
+        const std::size_t before = text.find_last_of(std::string_view("#\n\0", 3), at);
+        if (before != text.npos && text[before] == '#') continue;
+        text[at] = ' ';
+        if (newline + 1 < text.size()) text[newline] = '\0';
+    }
+}
+
+// The whole of a text file, its lines joined and each ended by '\n', the last one too.
+std::string read_text(const fs::path& path) {
+    const auto fail = [&](const std::string& what) { throw std::runtime_error(path.string() + ": " + what); };
+    std::error_code unknown;
+    if (fs::is_directory(path, unknown)) fail("is a directory");
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.string().c_str(), "rb"), std::fclose);
+    if (!file) fail("cannot be opened: " + std::generic_category().message(errno));
+    std::string text;
+    const std::uintmax_t size = fs::file_size(path, unknown);  // a pipe has none
+    if (!unknown && size <= max_bytes) text.reserve(size + 1);
+    std::array<char, 1 << 14> piece;
+    while (const std::size_t n = std::fread(piece.data(), 1, piece.size(), file.get())) {
+        if (std::memchr(piece.data(), 0, n)) fail("is a binary file, not text");
+        if (text.size() + n > max_bytes) fail("is larger than 4 GiB");
+        text.append(piece.data(), n);
+    }
+    if (std::ferror(file.get())) fail("cannot be read");
+    if (!text.ends_with('\n')) text += '\n';
+    if (text.starts_with("\xEF\xBB\xBF")) text.replace(0, 3, "   ");  // UTF-8's byte order mark
+    join_lines(text);
+    return text;
+}
+
+// Reads a text, or a part of one that ends with a newline, from the first byte to the last.
+class Scanner {
 public:
-    explicit TextFile(const fs::path& path) : name_(path.string()) {
-        std::error_code ignored;
-        if (fs::is_directory(path, ignored)) throw std::runtime_error(name_ + ": is a directory");
-        file_.reset(std::fopen(name_.c_str(), "rb"));
-        if (!file_) throw std::runtime_error(name_ + ": cannot be opened: " + std::generic_category().message(errno));
-    }
+    // [BEGIN,END) is not empty, ends with '\n' and has been through join_lines. NAME is for messages.
+    Scanner(const fs::path& name, std::string_view text)
+        : name_(name.string()), at_(text.data()), end_(at_ + text.size()), statement_(at_), counted_(at_) {}
 
-    // Drops what is left of this line and goes to the first word of the next. False at the end of the file.
-    bool next_line() {
-        if (*at_ != '\n') at_ = find_newline(at_);
-        at_++;
-        line_++;
-        if (at_ == limit_ && !refill()) return false;
-        skip_blanks();
-        first_line_ = line_;
-        return true;
-    }
+    bool is_done() const { return at_ == end_; }
+    void next_line() { statement_ = at_ = newline() + 1; }
 
     // At the end of a statement, be it the end of the line or a comment. Call it after skip_blanks.
     bool at_end() const { return *at_ == '\n' || *at_ == '#'; }
-    char peek() const { return *at_; }
-
     void skip_blanks() {
-        while (is_blank(*at_) || (*at_ == '\\' && continued(at_))) {
-            if (*at_ == '\\') {
-                at_ = find_newline(at_);
-                line_++;
-            }
-            at_++;
-        }
+        while (is_blank(*at_)) at_++;
     }
-
-    std::string_view word() {
-        const char* const begin = at_;
-        while (!ends_word()) at_++;
-        return {begin, static_cast<std::size_t>(at_ - begin)};
-    }
-
-    // The rest of the statement without blanks at its ends: a name may contain blanks and '#'. Valid until the next
-    // call.
-    std::string_view rest() {
-        skip_blanks();
-        const char* const begin = at_;
-        skip_statement();
-        std::string_view text(begin, static_cast<std::size_t>(at_ - begin));
-        if (text.find('\n') != text.npos) {
-            joined_ = text;
-            for (std::size_t i = 0; (i = joined_.find('\n', i)) != joined_.npos;)
-                joined_[joined_.rfind('\\', i)] = joined_[i] = ' ';
-            text = joined_;
-        }
-        while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-        return text;
-    }
-
-    // To the end of the line, over continuations.
-    void skip_statement() {
-        for (;;) {
-            const char* const newline = find_newline(at_);
-            if (!is_continuation(newline, at_)) {
-                at_ = newline;
-                return;
-            }
-            at_ = newline + 1;
-            line_++;
-        }
-    }
-
-    // A finite number. What underflows is zero.
-    double real() {
-        // Most numbers are short: up to 15 digits make an integer below 2^53, and 10^15 is a double too, so one
-        // division rounds correctly and gives what from_chars gives. It saves a seventh of the time of loading a big
-        // mesh.
-        static constexpr double power_of_ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
-                                                  1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
-        const char* p = at_;
-        const bool negative = *p == '-';
-        if (negative || *p == '+') p++;
-        std::uint64_t digits = 0;  // wraps round where there are too many, and then is not used
-        const char* const integer = p;
-        while (is_digit(*p)) digits = digits * 10 + static_cast<unsigned>(*p++ - '0');
-        std::ptrdiff_t count = p - integer, decimals = 0;
-        if (*p == '.') {
-            const char* const fraction = ++p;
-            while (is_digit(*p)) digits = digits * 10 + static_cast<unsigned>(*p++ - '0');
-            decimals = p - fraction;
-            count += decimals;
-        }
-        if (count < 1 || count > 15 || !(is_blank(*p) || *p == '\n')) return any_real();
-        at_ = p;
-        const double value = static_cast<double>(digits) / power_of_ten[decimals];
-        return negative ? -value : value;
-    }
-
-    // An integer whose magnitude is below 2^31.
-    int integer(const char* what) {
-        const char* p = at_;
-        const bool negative = *p == '-';
-        if (negative || *p == '+') p++;
-        std::uint64_t n = 0;  // wraps round after 19 digits
-        const char* const first = p;
-        while (is_digit(*p)) n = n * 10 + static_cast<unsigned>(*p++ - '0');
-        if (p == first) fail(in_quotes(rest_of_word()) + " is no " + what);
-        if (p - first > 19 || n > INT32_MAX)
-            fail(std::string(what) + " " + in_quotes(rest_of_word()) + " is out of range");
-        at_ = p;
-        return negative ? -static_cast<int>(n) : static_cast<int>(n);
-    }
-
     bool skip(char c) {
         if (*at_ != c) return false;
         at_++;
         return true;
     }
-
-    // After a number: it must not run into something else.
-    void expect_end_of_word() {
-        if (!ends_word()) fail("garbage after a number: " + in_quotes(rest_of_word()));
-    }
-
-    std::int64_t line() const { return line_; }
-    std::size_t bytes_read() const { return total_ - static_cast<std::size_t>(end_ - at_); }  // up to the cursor
-    [[noreturn]] void fail(const std::string& what) const { fail(line_, what); }
-    [[noreturn]] void fail_statement(const std::string& what) const { fail(first_line_, what); }
-    [[noreturn]] void fail(std::int64_t line, const std::string& what) const {
-        throw std::runtime_error(name_ + ":" + std::to_string(line) + ": " + what);
-    }
-
-private:
-    // A vertex takes 8 bytes of text, a corner 2: no array made from so much text has 2^31 elements.
-    static constexpr std::size_t max_bytes = std::size_t{1} << 32;
-    static constexpr std::size_t chunk = std::size_t{1} << 18;  // what is read at once: it fits a core's own cache
-
-    static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-    static bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-    // Whether the newline after a statement's part that starts at BEGIN is preceded by '\', blanks aside.
-    static bool is_continuation(const char* newline, const char* begin) {
-        while (newline > begin && is_blank(newline[-1])) newline--;
-        return newline > begin && newline[-1] == '\\';
-    }
-    // Whether the '\' here is the last thing in its line.
-    static bool continued(const char* backslash) {
-        do backslash++;
-        while (is_blank(*backslash));
-        return *backslash == '\n';
-    }
-    const char* find_newline(const char* from) const {  // there is one: the window ends with it
-        return static_cast<const char*>(std::memchr(from, '\n', static_cast<std::size_t>(limit_ - from)));
-    }
-    bool ends_word() const { return is_blank(*at_) || *at_ == '\n' || *at_ == '#' || (*at_ == '\\' && continued(at_)); }
-    std::string_view rest_of_word() const {
+    char peek() const { return *at_; }
+    std::string_view peek_word() {  // up to a blank
+        skip_blanks();
         const char* end = at_;
         while (!is_blank(*end) && *end != '\n') end++;
-        return {at_, static_cast<std::size_t>(end - at_)};
+        return {at_, end};
+    }
+    std::string_view word() {  // empty at the end of the statement
+        skip_blanks();
+        const char* const begin = at_;
+        while (!ends_word(*at_)) at_++;
+        return {begin, at_};
+    }
+    std::string rest() {  // of the line, without blanks at its ends: a name may contain blanks and '#'
+        skip_blanks();
+        const char *const begin = at_, *end = at_ = newline();
+        while (end > begin && is_blank(end[-1])) end--;
+        std::string text(begin, end);
+        std::replace(text.begin(), text.end(), '\0', ' ');
+        return text;
     }
 
-    double any_real() {
-        const char* const first = at_ + (*at_ == '+' && at_[1] != '-');
+    // A finite number. What underflows is zero, or the nearest denormal.
+    double real() {
+        // Most numbers are short: up to 15 digits make an integer below 2^53, and 10^15 is a double too, so one
+        // division rounds correctly and gives what from_chars gives, in less time.
+        static constexpr double power_of_ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                  1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+        const char* p = at_ + (*at_ == '-' || *at_ == '+');
+        const char *const first = p, *point = nullptr;
+        std::uint64_t digits = 0;  // wraps round where there are too many, and then is not used
+        for (; is_digit(*p) || (*p == '.' && !point); p++) {
+            if (*p == '.') point = p;
+            else digits = digits * 10 + static_cast<unsigned>(*p - '0');
+        }
+        const std::ptrdiff_t length = p - first - (point ? 1 : 0);
+        if (length > 0 && length <= 15 && ends_word(*p)) {
+            const double value = static_cast<double>(digits) / power_of_ten[point ? p - point - 1 : 0];
+            return *std::exchange(at_, p) == '-' ? -value : value;
+        }
+
+        const char* const begin = after_plus();
         double value = 0;
-        const auto [end, error] = std::from_chars(first, limit_, value);
-        if (error == std::errc::invalid_argument) fail(in_quotes(rest_of_word()) + " is no number");
-        if (error == std::errc::result_out_of_range)
-            value = std::copysign(is_large(first, end) ? HUGE_VAL : 0, *first == '-' ? -1 : 1);
-        if (!std::isfinite(value)) fail(in_quotes(rest_of_word()) + " is not finite");
+        const auto [end, error] = std::from_chars(begin, end_, value);
+        if (error == std::errc::invalid_argument) fail(in_quotes(peek_word()) + " is no number");
+        if (error == std::errc::result_out_of_range)  // above or below: strtod says which
+            value = std::strtod(std::string(begin, end).c_str(), nullptr);
+        if (!std::isfinite(value)) fail(in_quotes(peek_word()) + " is not finite");
         at_ = end;
         expect_end_of_word();
         return value;
     }
 
-    // Of a number that does not fit a double: whether it is too large, not too small. That is decided by the decimal
-    // exponent of its first digit other than 0.
-    static bool is_large(const char* p, const char* end) {
-        std::int64_t exponent = 0;
-        bool significant = false, fraction = false;
-        for (; p < end && *p != 'e' && *p != 'E'; p++) {
-            if (*p == '.') fraction = true;
-            if (!is_digit(*p)) continue;
-            significant = significant || *p != '0';
-            exponent += fraction ? (significant ? 0 : -1) : (significant ? 1 : 0);
-        }
-        if (p < end) {
-            const bool negative = *++p == '-';
-            std::int64_t written = 0;
-            for (; p < end; p++)
-                if (is_digit(*p))
-                    written = std::min(written * 10 + (*p - '0'), std::int64_t{1} << 40);  // beyond any length
-            exponent += negative ? -written : written;
-        }
-        return exponent > 0;
+    // An integer whose magnitude is below 2^31.
+    int integer(const char* what) {
+        std::int64_t value = 0;
+        const auto [end, error] = std::from_chars(after_plus(), end_, value);
+        if (error == std::errc::invalid_argument) fail(in_quotes(peek_word()) + " is no " + what);
+        if (error != std::errc() || std::abs(value) > INT32_MAX)
+            fail(std::string(what) + " " + in_quotes(peek_word()) + " is out of range");
+        at_ = end;
+        return static_cast<int>(value);
     }
 
-    // Keeps the unfinished line and reads on until the window ends with a whole one.
-    bool refill() {
-        if (finished_) return false;
-        const std::size_t kept = static_cast<std::size_t>(end_ - limit_);
-        std::memmove(window_.get(), limit_, kept);
-        std::size_t filled = kept;
-        for (;;) {
-            if (filled + chunk + 2 > capacity_) {
-                const std::size_t larger = std::max(2 * capacity_, chunk + chunk / 4);
-                auto grown = std::make_unique_for_overwrite<char[]>(larger);
-                std::memcpy(grown.get(), window_.get(), filled);
-                window_ = std::move(grown);
-                capacity_ = larger;
-            }
-            char* const fresh = window_.get() + filled;
-            const std::size_t n = std::fread(fresh, 1, chunk, file_.get());
-            if (std::ferror(file_.get())) throw std::runtime_error(name_ + ": cannot be read");
-            if (std::memchr(fresh, 0, n)) throw std::runtime_error(name_ + ": is a binary file, not text");
-            if ((total_ += n) > max_bytes) throw std::runtime_error(name_ + ": is larger than 4 GiB");
-            filled += n;
-            at_ = window_.get();
-            if (line_ == 1 && filled >= 3 && std::memcmp(at_, "\xEF\xBB\xBF", 3) == 0)
-                at_ += 3;     // UTF-8's byte order mark
-            if (n < chunk) {  // the end; two newlines, so that even a '\' there has a line to go on in
-                window_[filled] = window_[filled + 1] = '\n';
-                end_ = limit_ = window_.get() + filled + 2;
-                return finished_ = true;
-            }
-            end_ = window_.get() + filled;
-            for (const char* p = end_; p > fresh;)
-                if (*--p == '\n' && !is_continuation(p, window_.get())) {
-                    limit_ = p + 1;
-                    return true;
-                }
-        }
+    // After a number: it must not run into something else.
+    void expect_end_of_word() {
+        if (!ends_word(*at_)) fail("garbage after a number: " + in_quotes(peek_word()));
     }
 
-    struct Close {
-        void operator()(std::FILE* f) const { std::fclose(f); }
-    };
-    std::string name_, joined_;
-    std::unique_ptr<std::FILE, Close> file_;
-    std::size_t capacity_ = 1, total_ = 0;
-    std::unique_ptr<char[]> window_ = std::make_unique<char[]>(1);
-    // window_ <= at_ < limit_ <= end_: the cursor, the end of the last whole line, the end of what has been read.
-    const char* at_ = &(window_[0] = '\n');  // as if after line 0
-    const char* limit_ = at_ + 1;
-    const char* end_ = limit_;
-    std::int64_t line_ = 0, first_line_ = 0;  // of the cursor, of its statement
-    bool finished_ = false;
+    const char* position() const { return at_; }
+    // The number of the statement's first line.
+    std::int64_t line() { return line(statement_); }
+    // Errors of what is at the cursor, at the beginning of the statement, and at a former position.
+    [[noreturn]] void fail(const std::string& what) { fail(at_, what); }
+    [[noreturn]] void fail_statement(const std::string& what) { fail(statement_, what); }
+    [[noreturn]] void fail(const char* position, const std::string& what) {
+        throw std::runtime_error(name_ + ":" + std::to_string(line(position)) + ": " + what);
+    }
+
+private:
+    static bool ends_word(char c) { return is_blank(c) || c == '\n' || c == '#'; }
+    const char* newline() const { return static_cast<const char*>(std::memchr(at_, '\n', end_ - at_)); }
+    const char* after_plus() const { return at_ + (*at_ == '+' && at_[1] != '-'); }
+    std::int64_t line(const char* position) {  // counts on from where it was asked last: positions do not go back
+        line_ += std::count_if(counted_, position, [](char c) { return c == '\n' || c == '\0'; });
+        counted_ = position;
+        return line_;
+    }
+
+    std::string name_;
+    const char *at_, *end_, *statement_;  // the cursor; the text's end; the beginning of the cursor's statement
+    const char* counted_;
+    std::int64_t line_ = 1;  // of counted_
 };
 
 // ---- the .obj ----
-
-// Numbers the distinct strings that it is given, in the order of their first appearance.
-class Names {
-public:
-    int id(std::string_view name) {
-        const auto found = ids_.find(name);
-        if (found != ids_.end()) return found->second;
-        ids_.emplace(name, to_int(list_.size()));
-        list_.emplace_back(name);
-        return to_int(list_.size()) - 1;
-    }
-    const std::vector<std::string>& list() const { return list_; }
-
-private:
-    std::map<std::string, int, std::less<>> ids_;
-    std::vector<std::string> list_;
-};
 
 // What the file says, before it is known whether its indices are right. Faces are triangles already, but those of a
 // polygon are a fan, to be cut better once the vertices are known.
@@ -322,43 +212,38 @@ struct Obj {
         int face, corners;  // its first triangle, and how many corners it has: two more than triangles
     };
     struct Run {
-        int face, name;  // from this face on usemtl holds; -1 before the first one
+        int face;  // from this face on MATERIAL is used
+        std::string material;
     };
     std::vector<vec3> verts, normals;
     std::vector<vec2> uvs;
     std::vector<Corner> corners;
     std::vector<Polygon> polygons;
-    std::vector<Run> runs{{0, -1}};
+    std::vector<Run> runs{{0, ""}};
+    std::vector<std::string> libraries;
     bool lacks_normals = false;  // some corner has none, or some normal has no length
-    Names materials, libraries;
 };
 
-class ObjReader {
+class ObjParser {
 public:
-    explicit ObjReader(const fs::path& path) : in_(path), path_(path) {
-        std::error_code unknown;
-        const auto bytes = fs::file_size(path, unknown);
-        file_size_ = unknown ? 0 : bytes;
-    }
+    ObjParser(const fs::path& path, std::string_view text) : in_(path, text) {}
 
-    Obj read() {
-        while (in_.next_line()) {
-            if (in_.at_end()) continue;
+    Obj parse() {
+        for (; !in_.is_done(); in_.next_line()) {
             const std::string_view word = in_.word();
-            if (word == "v") append(obj_.verts, verts_began_, vector("a vertex needs three coordinates"));
-            else if (word == "vt") append(obj_.uvs, uvs_began_, uv());
-            else if (word == "vn") append(obj_.normals, normals_began_, unit_normal());
+            if (word == "v") obj_.verts.push_back(vector("a vertex needs three coordinates"));
+            else if (word == "vt") obj_.uvs.push_back(uv());
+            else if (word == "vn") obj_.normals.push_back(unit_normal());
             else if (word == "f") face();
             else if (word == "usemtl") use_material();
-            else if (word == "mtllib") obj_.libraries.id(in_.rest());
-            else in_.skip_statement();  // o, g, s, lines, curves and what nobody knows
+            else if (word == "mtllib") obj_.libraries.push_back(in_.rest());
+            // o, g, s, lines, curves and what nobody knows: nothing
         }
-        if (obj_.corners.empty()) throw std::runtime_error(path_.string() + ": no faces");
-        const std::size_t counts[] = {obj_.verts.size(), obj_.uvs.size(), obj_.normals.size()};
+        const int counts[] = {count(obj_.verts), count(obj_.uvs), count(obj_.normals)};
         for (const Forward& f : forward_)
-            if (to_size(f.index) > counts[f.kind])
-                in_.fail(f.line, std::string(kinds[f.kind]) + " " + std::to_string(f.index) +
-                                     ", but the file has only " + std::to_string(counts[f.kind]));
+            if (f.index > counts[f.kind])
+                in_.fail(f.position, std::string(kinds[f.kind]) + " " + std::to_string(f.index) +
+                                         ", but the file has only " + std::to_string(counts[f.kind]));
         return std::move(obj_);
     }
 
@@ -366,26 +251,11 @@ private:
     enum Kind { vertex, texture, normal };
     static constexpr const char* kinds[] = {"vertex index", "texture index", "normal index"};
     struct Forward {  // an index of something that had not been defined yet: checked at the end
-        std::int64_t line;
+        const char* position;
         Kind kind;
         int index;
     };
 
-    // A full array grows to what it would be if the rest of the file were like the part since its first element, within
-    // 2 to 16 times its size. Less is copied than by doubling, and less fresh memory touched: a seventh of the loading
-    // time.
-    template <typename T>
-    void append(std::vector<T>& array, std::uintmax_t& began, const T& value) {
-        const std::size_t n = array.size();
-        if (n == array.capacity()) {
-            const std::uintmax_t read = in_.bytes_read();
-            if (n == 0) began = read;
-            const double per_byte = static_cast<double>(n) / static_cast<double>(read - began + 1);
-            const double expected = per_byte * static_cast<double>(file_size_ - std::min(file_size_, read));
-            array.reserve(n + std::clamp(static_cast<std::size_t>(expected), n + 64, 15 * n + 64));
-        }
-        array.push_back(value);
-    }
     double real(const char* needs) {
         in_.skip_blanks();
         if (in_.at_end()) in_.fail_statement(needs);
@@ -413,26 +283,22 @@ private:
     }
 
     // An index as written, from 1 or from the end of what has been defined so far, made one from 0.
-    int index(Kind kind, std::size_t count) {
+    int index(Kind kind, int defined) {
         const int i = in_.integer(kinds[kind]);
-        if (i > 0) {
-            if (to_size(i) > count) forward_.push_back({in_.line(), kind, i});
-            return i - 1;
-        }
+        if (i > defined) forward_.push_back({in_.position(), kind, i});
+        if (i > 0) return i - 1;
         if (i == 0) in_.fail(std::string(kinds[kind]) + " 0 (indices count from 1)");
-        if (to_size(-i) > count)
-            in_.fail(std::string(kinds[kind]) + " " + std::to_string(i) + ", but only " + std::to_string(count) +
+        if (-i > defined)
+            in_.fail(std::string(kinds[kind]) + " " + std::to_string(i) + ", but only " + std::to_string(defined) +
                      " are defined so far");
-        return to_int(count) + i;
+        return defined + i;
     }
     Corner corner() {  // v, v/vt, v//vn or v/vt/vn; v/ and v// are seen too
-        const auto given = [this] {
-            return in_.peek() == '-' || in_.peek() == '+' || (in_.peek() >= '0' && in_.peek() <= '9');
-        };
-        Corner c{index(vertex, obj_.verts.size()), -1, -1};
+        const auto given = [this] { return in_.peek() == '-' || in_.peek() == '+' || is_digit(in_.peek()); };
+        Corner c{index(vertex, count(obj_.verts)), -1, -1};
         if (in_.skip('/')) {
-            if (given()) c.uv = index(texture, obj_.uvs.size());
-            if (in_.skip('/') && given()) c.normal = index(normal, obj_.normals.size());
+            if (given()) c.uv = index(texture, count(obj_.uvs));
+            if (in_.skip('/') && given()) c.normal = index(normal, count(obj_.normals));
         }
         in_.expect_end_of_word();
         if (c.normal < 0) obj_.lacks_normals = true;
@@ -441,41 +307,35 @@ private:
     void face() {
         Corner first{}, previous{};
         int n = 0;
-        const int begin = to_int(obj_.corners.size() / 3);
-        for (in_.skip_blanks(); !in_.at_end(); in_.skip_blanks()) {
+        const int begin = nfaces();
+        for (in_.skip_blanks(); !in_.at_end(); in_.skip_blanks(), n++) {
             const Corner c = corner();
-            if (n >= 2)
-                for (const Corner& each : {first, previous, c}) append(obj_.corners, corners_began_, each);
-            if (n++ == 0) first = c;
+            if (n == 0) first = c;
+            if (n >= 2) obj_.corners.insert(obj_.corners.end(), {first, previous, c});
             previous = c;
         }
         if (n < 3) in_.fail_statement("a face needs three corners, this one has " + std::to_string(n));
         if (n > 3) obj_.polygons.push_back({begin, n});
     }
     void use_material() {
-        const int name = obj_.materials.id(in_.rest()), face = to_int(obj_.corners.size() / 3);
-        if (obj_.runs.back().face == face) obj_.runs.back().name = name;
-        else obj_.runs.push_back({face, name});
+        if (obj_.runs.back().face != nfaces()) obj_.runs.push_back({nfaces(), {}});
+        obj_.runs.back().material = in_.rest();
     }
+    int nfaces() const { return static_cast<int>(obj_.corners.size() / 3); }
 
-    TextFile in_;
-    fs::path path_;
-    std::uintmax_t file_size_ = 0;
-    std::uintmax_t verts_began_ = 0, uvs_began_ = 0, normals_began_ = 0,
-                   corners_began_ = 0;  // bytes before the first one
+    Scanner in_;
     Obj obj_;
     std::vector<Forward> forward_;
 };
 
 // ---- polygons ----
 
-double scaled(double x, int exponent) { return std::scalbn(x, -exponent); }
-vec3 scaled(const vec3& v, int e) { return {scaled(v.x, e), scaled(v.y, e), scaled(v.z, e)}; }
 double largest(const vec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
 
-// Products of two such numbers, and sums of a few, stay clear of the ends of the double's range; what lies outside is
-// scaled by a power of two first, which changes no sign and no direction.
-bool is_moderate(double x) { return x > 1e-100 && x < 1e100; }
+// The power of two that brings X > 0 into [1,2), so that products and differences of numbers up to X neither overflow
+// nor vanish. To multiply by it changes no sign and no direction. (What is denormal comes out smaller: 2^1023 is the
+// largest power of two.)
+double unit_for(double x) { return std::scalbn(1., std::min(-std::ilogb(x), 1023)); }
 
 // Twice the signed area of the triangle abc, positive where it is counterclockwise.
 double area2(const vec2& a, const vec2& b, const vec2& c) {
@@ -484,232 +344,120 @@ double area2(const vec2& a, const vec2& b, const vec2& c) {
 
 // Cuts polygons into triangles, always two fewer than corners, in the plane of the polygon's Newell normal: a fan where
 // that is right, and else ear clipping (G. H. Meisters, "Polygons have ears", 1975). An ear is a corner with a convex
-// angle whose triangle no reflex corner lies in; cutting it off changes only whether its two neighbours are ears.
-//
-// The reflex corners are kept in a k-d tree, so a test usually looks at some ten to a hundred nodes instead of all
-// corners: 100 000 corners take a tenth of a second. Where it does not (a fine staircase askew to the axes is the worst
-// case known), the work is bounded all the same: a model has 2^27 nodes (a second or two) and 100 per corner; what is
-// left then becomes a fan.
+// angle whose triangle no reflex corner lies in; cutting it off changes only whether its two neighbours are ears. So n
+// corners are asked 3n times at most, and each time n corners are looked at. From max_corners on a polygon is a fan,
+// so that this stays below 3000 looks per corner, whatever the file.
 class PolygonCutter {
 public:
     // FAN holds the polygon (c0, c1, c2, ...) as the triangles (c0,c1,c2), (c0,c2,c3), ... and receives the triangles.
-    // They wind as the polygon does. Returns false where the polygon crosses itself, or was too much work, so that a
+    // They wind as the polygon does. Returns false where the polygon crosses itself or has too many corners, so that a
     // part of it is still a fan. A polygon without area stays a fan, too.
     bool cut(const std::vector<vec3>& verts, Corner* fan, int n) {
         corners_.assign({fan[0], fan[1]});
-        for (int i = 0; i < n - 2; i++) corners_.push_back(fan[3 * std::ptrdiff_t{i} + 2]);
+        for (std::ptrdiff_t i = 0; i < n - 2; i++) corners_.push_back(fan[3 * i + 2]);
         if (!project(verts) || is_good_fan()) return true;
-        return clip_ears(fan);
+        return n <= max_corners && clip_ears(fan);
     }
 
 private:
+    static constexpr int max_corners = 1000;
+
     // Fills points_: the corners seen along the axis that is nearest to the normal, so that the polygon runs
     // counterclockwise. Unlike a turn into the plane, leaving out a coordinate rounds nothing: three corners on a line
     // stay on it. False where there is no area.
     bool project(const std::vector<vec3>& verts) {
-        const auto vert = [&](std::size_t i) { return verts[to_size(corners_[i].vert)]; };
-        double extent = 0;
-        for (std::size_t i = 0; i < corners_.size(); i++) extent = std::max(extent, largest(vert(i)));
-        const int e = extent < 1e100 ? 0 : std::ilogb(extent);  // else differences may overflow
-        const vec3 origin = scaled(vert(0), e);
+        double extent = 0, span = 0;
+        for (const Corner& c : corners_) extent = std::max(extent, largest(verts[c.vert]));
+        if (!(extent > 0)) return false;
+        const double unit = unit_for(extent);  // else differences may overflow
+        const vec3 origin = verts[corners_[0].vert] * unit;
         relative_.clear();
-        double span = 0;
-        for (std::size_t i = 0; i < corners_.size(); i++) {
-            relative_.push_back((e ? scaled(vert(i), e) : vert(i)) - origin);
+        for (const Corner& c : corners_) {
+            relative_.push_back(verts[c.vert] * unit - origin);
             span = std::max(span, largest(relative_.back()));
         }
         if (!(span > 0)) return false;
-        if (!is_moderate(span))
-            for (vec3& p : relative_) p = scaled(p, std::ilogb(span));
+        for (vec3& p : relative_) p = p * unit_for(span);
 
         vec3 newell;  // twice the polygon's area along its normal
-        for (std::size_t i = 1; i + 1 < relative_.size(); i++) newell = newell + cross(relative_[i], relative_[i + 1]);
+        for (int i = 1; i + 1 < count(relative_); i++) newell = newell + cross(relative_[i], relative_[i + 1]);
         const double area = largest(newell);
         if (!(area > 0)) return false;
         const int axis = std::fabs(newell.z) == area ? 2 : std::fabs(newell.y) == area ? 1 : 0;
-        const int right = (axis + 1) % 3, up = (axis + 2) % 3;
+        int right = (axis + 1) % 3, up = (axis + 2) % 3;
+        if (newell[axis] < 0) std::swap(right, up);
         points_.clear();
-        for (const vec3& p : relative_)
-            points_.push_back(newell[axis] > 0 ? vec2{p[right], p[up]} : vec2{p[up], p[right]});
+        for (const vec3& p : relative_) points_.push_back({p[right], p[up]});
         return true;
     }
 
     // The fan's signed areas add up to the polygon, wherever the corners are. So it is right where all are positive.
     bool is_good_fan() const {
-        for (std::size_t i = 1; i + 1 < points_.size(); i++)
+        for (int i = 1; i + 1 < count(points_); i++)
             if (!(area2(points_[0], points_[i], points_[i + 1]) > 0)) return false;
         return true;
     }
 
     bool clip_ears(Corner* out) {
-        const int n = to_int(corners_.size());
-        previous_.resize(to_size(n));
-        next_.resize(to_size(n));
-        reflex_.assign(to_size(n), 0);
-        queued_.assign(to_size(n), 0);
-        alive_.assign(to_size(n), 1);
-        place_.resize(to_size(n));
-        tree_.clear();
-        spikes_.clear();
-        queue_.clear();
-        queue_head_ = 0;
+        const int n = count(corners_);
+        previous_.resize(n);
+        next_.resize(n);
         for (int i = 0; i < n; i++) {
-            previous_[to_size(i)] = i ? i - 1 : n - 1;
-            next_[to_size(i)] = i < n - 1 ? i + 1 : 0;
+            previous_[i] = i ? i - 1 : n - 1;
+            next_[i] = i < n - 1 ? i + 1 : 0;
         }
-        for (int i = 0; i < n; i++) {
-            if (turn(i) <= 0) {
-                reflex_[to_size(i)] = 1;
-                tree_.push_back({points_[to_size(i)], {}, {}, i, 0});
-            }
-            enqueue(i);
-        }
-        grow_tree(0, to_int(tree_.size()));
-
-        work_ += std::int64_t{100} * n;
         const auto emit = [&](int a, int b, int c) {
-            *out++ = corners_[to_size(a)];
-            *out++ = corners_[to_size(b)];
-            *out++ = corners_[to_size(c)];
+            for (const int i : {a, b, c}) *out++ = corners_[i];
         };
-        int left = n, some = 0;
-        while (left > 3 && work_ > 0) {
-            const int v = dequeue();
-            if (v < 0) break;  // no ear: it crosses itself
-            work_--;
-            if (!alive_[to_size(v)] || !is_ear(v)) continue;
-            const int u = previous_[to_size(v)], w = next_[to_size(v)];
-            emit(u, v, w);
-            alive_[to_size(v)] = 0;
-            next_[to_size(u)] = w;
-            previous_[to_size(w)] = u;
-            some = w;
-            left--;
-            if (reflex_[to_size(v)]) remove_from_tree(v);
-            for (const int neighbour : {u, w}) {
-                if (reflex_[to_size(neighbour)] && turn(neighbour) > 0) remove_from_tree(neighbour);
-                enqueue(neighbour);
+        std::vector<char> is_no_ear(n, 0);
+        int left = n, v = 0;
+        for (int passed = 0; left > 3 && passed < left;) {  // all passed: there is no ear, it crosses itself
+            const int u = previous_[v], w = next_[v];
+            if (is_no_ear[v] || !is_ear(v)) {
+                is_no_ear[v] = 1;
+                passed++;
+            } else {
+                emit(u, v, w);
+                next_[u] = w;
+                previous_[w] = u;
+                is_no_ear[u] = is_no_ear[w] = 0;
+                passed = 0;
+                left--;
             }
+            v = w;
         }
-        for (int a = next_[to_size(some)]; next_[to_size(a)] != some; a = next_[to_size(a)])
-            emit(some, a, next_[to_size(a)]);
+        for (int a = next_[v]; next_[a] != v; a = next_[a]) emit(v, a, next_[a]);
         return left == 3;
     }
 
     double turn(int v) const {  // positive where the angle at v is convex
-        return area2(points_[to_size(previous_[to_size(v)])], points_[to_size(v)], points_[to_size(next_[to_size(v)])]);
+        return area2(points_[previous_[v]], points_[v], points_[next_[v]]);
     }
 
     // A corner without area that is not between its neighbours: the tip of a spike, or a point twice. It can be cut off
     // at any time, and must be before an ear is cut beside it, because that would be outside the polygon.
     bool is_spike(int v) const {
-        const vec2 p = points_[to_size(v)];
-        return turn(v) == 0 &&
-               dot(points_[to_size(previous_[to_size(v)])] - p, points_[to_size(next_[to_size(v)])] - p) >= 0;
+        const vec2 p = points_[v];
+        return turn(v) == 0 && dot(points_[previous_[v]] - p, points_[next_[v]] - p) >= 0;
     }
-    bool is_ear(int v) {
+    bool is_ear(int v) const {
+        const int u = previous_[v], w = next_[v];
         if (!(turn(v) > 0)) return is_spike(v);
-        triangle_ = {points_[to_size(previous_[to_size(v)])], points_[to_size(v)], points_[to_size(next_[to_size(v)])]};
-        const auto& [a, b, c] = triangle_;
-        low_ = {std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y})};
-        high_ = {std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y})};
-        return !is_any_inside(0, to_int(tree_.size()));
-    }
-
-    // First in, first out, so that the ears are taken all round the polygon; but spikes before everything else.
-    void enqueue(int v) {
-        if (is_spike(v)) spikes_.push_back(v);
-        else if (!queued_[to_size(v)]) {
-            queued_[to_size(v)] = 1;
-            queue_.push_back(v);
+        if (is_spike(u) || is_spike(w)) return false;
+        const vec2 a = points_[u], b = points_[v], c = points_[w];
+        for (int i = next_[w]; i != u; i = next_[i]) {
+            const vec2 p = points_[i];
+            if (area2(a, b, p) < 0 || area2(b, c, p) < 0 || area2(c, a, p) < 0) continue;
+            const bool is_corner = p == a || p == b || p == c;  // a corner at the same place does not block
+            if (!is_corner && turn(i) <= 0) return false;
         }
-    }
-    int dequeue() {
-        if (!spikes_.empty()) {
-            const int v = spikes_.back();
-            spikes_.pop_back();
-            return v;
-        }
-        if (queue_head_ == queue_.size()) return -1;
-        const int v = queue_[queue_head_++];
-        queued_[to_size(v)] = 0;
-        return v;
-    }
-
-    // The k-d tree of reflex corners. The subtree of tree_[low,high) has its root in the middle.
-    struct Node {
-        vec2 point, low, high;  // the corner; the box of the subtree
-        int corner;
-        int reflex;  // how many corners of the subtree are reflex still
-    };
-
-    void grow_tree(int low, int high) {
-        if (low >= high) return;
-        const int middle = low + (high - low) / 2;
-        vec2 least = tree_[to_size(low)].point, most = least;
-        for (int i = low + 1; i < high; i++) {
-            const vec2& p = tree_[to_size(i)].point;
-            least = {std::min(least.x, p.x), std::min(least.y, p.y)};
-            most = {std::max(most.x, p.x), std::max(most.y, p.y)};
-        }
-        const int axis = most.x - least.x < most.y - least.y ? 1 : 0;  // across the longer side
-        std::nth_element(
-            tree_.begin() + low, tree_.begin() + middle, tree_.begin() + high, [&](const Node& a, const Node& b) {
-                return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.corner < b.corner;
-            });
-        Node& root = tree_[to_size(middle)];
-        root.low = least;
-        root.high = most;
-        root.reflex = high - low;
-        place_[to_size(root.corner)] = middle;
-        grow_tree(low, middle);
-        grow_tree(middle + 1, high);
-    }
-    void remove_from_tree(int v) {
-        reflex_[to_size(v)] = 0;
-        for (int low = 0, high = to_int(tree_.size());;) {
-            const int middle = low + (high - low) / 2;
-            tree_[to_size(middle)].reflex--;
-            if (place_[to_size(v)] == middle) return;
-            if (place_[to_size(v)] < middle) high = middle;
-            else low = middle + 1;
-        }
-    }
-
-    // Whether a reflex corner of the subtree blocks the ear triangle_.
-    bool is_any_inside(int low, int high) {
-        if (low >= high) return false;
-        const int middle = low + (high - low) / 2;
-        const Node& node = tree_[to_size(middle)];
-        if (node.reflex == 0) return false;
-        work_--;
-        if (high_.x < node.low.x || low_.x > node.high.x || high_.y < node.low.y || low_.y > node.high.y) return false;
-        // Nothing is inside if even the innermost corner of the box is outside an edge. Since rounding is monotonic,
-        // what is computed for that corner is not below what blocks() computes for any point of the box.
-        for (std::size_t i = 0; i < 3; i++) {
-            const vec2 &a = triangle_[i], &b = triangle_[(i + 1) % 3];
-            const vec2 innermost{b.y > a.y ? node.low.x : node.high.x, b.x > a.x ? node.high.y : node.low.y};
-            if (area2(a, b, innermost) < 0) return false;
-        }
-        return (reflex_[to_size(node.corner)] && blocks(node.point)) || is_any_inside(low, middle) ||
-               is_any_inside(middle + 1, high);
-    }
-    bool blocks(const vec2& p) const {  // a corner of the triangle itself does not, nor one at the same place
-        const auto& [a, b, c] = triangle_;
-        if (p == a || p == b || p == c) return false;
-        return area2(a, b, p) >= 0 && area2(b, c, p) >= 0 && area2(c, a, p) >= 0;
+        return true;
     }
 
     std::vector<Corner> corners_;
     std::vector<vec3> relative_;
     std::vector<vec2> points_;
-    std::vector<Node> tree_;
-    std::vector<int> previous_, next_, spikes_, queue_, place_;  // place_: where in the tree a reflex corner is
-    std::vector<char> reflex_, queued_, alive_;
-    std::size_t queue_head_ = 0;
-    std::array<vec2, 3> triangle_;               // of the ear in question
-    vec2 low_, high_;                            // its box
-    std::int64_t work_ = std::int64_t{1} << 27;  // nodes that may still be looked at
+    std::vector<int> previous_, next_;
 };
 
 // ---- normals where the file gives none ----
@@ -722,15 +470,14 @@ struct Face {
 
 Face measure(const vec3& a, const vec3& b, const vec3& c) {
     vec3 edges[] = {b - a, c - b, a - c};
-    double length = std::max({largest(edges[0]), largest(edges[1]), largest(edges[2])});
+    const double length = std::max({largest(edges[0]), largest(edges[1]), largest(edges[2])});
     if (!std::isfinite(length)) return measure(a * .25, b * .25, c * .25);  // a difference has overflowed
     if (!(length > 0)) return {};
-    if (!is_moderate(length))
-        for (vec3& e : edges) e = scaled(e, std::ilogb(length));
+    for (vec3& e : edges) e = e * unit_for(length);
 
     // The two edges across from the longest one have the best-conditioned cross product.
     const double squares[] = {dot(edges[0], edges[0]), dot(edges[1], edges[1]), dot(edges[2], edges[2])};
-    const std::size_t i = static_cast<std::size_t>(std::max_element(squares, squares + 3) - squares);
+    const std::ptrdiff_t i = std::max_element(squares, squares + 3) - squares;
     const vec3 longest = edges[i], next = edges[(i + 1) % 3], last = edges[(i + 2) % 3];
     const vec3 across = cross(next, last);
 
@@ -744,8 +491,7 @@ Face measure(const vec3& a, const vec3& b, const vec3& c) {
         return {};
 
     Face face{normalized(across)};
-    const double area =
-        norm(across);  // twice; of any two edges, it is the product of their lengths and the sine between
+    const double area = norm(across);  // twice: the product of any two edges' lengths and the sine between them
     face.angles[i] = std::atan2(area, -dot(longest, last));
     face.angles[(i + 1) % 3] = std::atan2(area, -dot(next, longest));
     face.angles[(i + 2) % 3] = std::numbers::pi - face.angles[i] - face.angles[(i + 1) % 3];
@@ -756,23 +502,18 @@ Face measure(const vec3& a, const vec3& b, const vec3& c) {
 // vertex, each weighted by its angle there (G. Thuermer and C. Wuethrich, "Computing vertex normals from polygonal
 // facets", 1998), which does not depend on how the polygons have been cut.
 void make_normals(const std::vector<vec3>& verts, std::vector<Corner>& corners, std::vector<vec3>& normals) {
-    for (Corner& c : corners)
-        if (c.normal >= 0 && normals[to_size(c.normal)] == vec3{}) c.normal = -1;
     struct Sum {
         vec3 normals;
         double angles = 0;
         int faces = 0;
-        int index = -1;  // of the mean in NORMALS; -2 where there is none
     };
     std::vector<Sum> sums(verts.size());
-    const auto face_of = [&](std::size_t first) {
-        return measure(verts[to_size(corners[first].vert)], verts[to_size(corners[first + 1].vert)],
-                       verts[to_size(corners[first + 2].vert)]);
-    };
-    for (std::size_t first = 0; first < corners.size(); first += 3) {
-        const Face face = face_of(first);
-        for (std::size_t k = 0; k < 3; k++) {
-            Sum& sum = sums[to_size(corners[first + k].vert)];
+    const auto face_of = [&](const Corner* c) { return measure(verts[c[0].vert], verts[c[1].vert], verts[c[2].vert]); };
+    const Corner* const end = corners.data() + corners.size();
+    for (const Corner* c = corners.data(); c < end; c += 3) {
+        const Face face = face_of(c);
+        for (int k = 0; k < 3; k++) {
+            Sum& sum = sums[c[k].vert];
             sum.normals = sum.normals + face.normal * face.angles[k];
             sum.angles += face.angles[k];
             sum.faces++;
@@ -781,30 +522,22 @@ void make_normals(const std::vector<vec3>& verts, std::vector<Corner>& corners, 
 
     // A sum of n terms is off by at most n half-units of the sum of their sizes, its terms themselves by less than 4
     // units each. No more than that is left where the faces cancel, as on the two sides of a sheet: then a face has its
-    // own normal.
-    const auto mean = [&](Sum& sum) {
-        if (sum.index == -1) {
-            const double noise = (sum.faces + 4) * sum.angles * std::numeric_limits<double>::epsilon();
-            sum.index = norm(sum.normals) > noise ? to_int(normals.size()) : -2;
-            if (sum.index >= 0) normals.push_back(normalized(sum.normals));
-        }
-        return sum.index;
-    };
-    int upright = -1;  // the normal of what has no direction at all
-    for (std::size_t first = 0; first < corners.size(); first += 3) {
+    // own normal, or an upright one where it has no area.
+    const int first_mean = count(normals);
+    for (const Sum& sum : sums) {
+        const double noise = (sum.faces + 4) * sum.angles * std::numeric_limits<double>::epsilon();
+        normals.push_back(norm(sum.normals) > noise ? normalized(sum.normals) : vec3{});
+    }
+    for (Corner* c = corners.data(); c < end; c += 3) {
         int own = -1;
-        for (std::size_t k = 0; k < 3; k++) {
-            int& normal = corners[first + k].normal;
-            if (normal >= 0 || (normal = mean(sums[to_size(corners[first + k].vert)])) >= 0) continue;
+        for (int k = 0; k < 3; k++) {
+            int& normal = c[k].normal;
+            if (normal < 0 || normals[normal] == vec3{}) normal = first_mean + c[k].vert;
+            if (!(normals[normal] == vec3{})) continue;
             if (own < 0) {
-                vec3 n = face_of(first).normal;
-                int& index = n == vec3{} ? upright : own;
-                if (n == vec3{}) n = {0, 0, 1};
-                if (index < 0) {
-                    index = to_int(normals.size());
-                    normals.push_back(n);
-                }
-                own = index;
+                own = count(normals);
+                const vec3 n = face_of(c).normal;
+                normals.push_back(n == vec3{} ? vec3{0, 0, 1} : n);
             }
             normal = own;
         }
@@ -813,26 +546,30 @@ void make_normals(const std::vector<vec3>& verts, std::vector<Corner>& corners, 
 
 // ---- materials ----
 
-enum Map { diffuse_map, specular_map, glow_map, normal_map, bump_map };
-constexpr std::size_t map_count = 5;
+// The kinds of map: the end of the name of a picture beside the model, and where it goes.
+enum { diffuse_map, normal_map, tangent_map, specular_map, glow_map, map_count, bump_map = map_count };
+constexpr struct {
+    const char* suffix;
+    TGAImage Material::*map;
+} map_kinds[map_count] = {{"_diffuse.tga", &Material::diffuse},
+                          {"_nm.tga", &Material::normal},
+                          {"_nm_tangent.tga", &Material::tangent},
+                          {"_spec.tga", &Material::specular},
+                          {"_glow.tga", &Material::glow}};
 
 struct MtlMaterial {
-    struct Name {
-        std::string file;  // as written; empty where there is no such map
-        std::int64_t line = 0;
-    };
     vec3 Kd{1, 1, 1};
-    std::array<Name, map_count> maps;
-    fs::path mtl;  // the file that it stands in
+    std::array<std::string, map_count + 1> maps;  // paths, empty where there is none; bump_map is what else tangent_map is
+    std::vector<std::string> notes;
 };
-using MtlMaterials = std::map<std::string, MtlMaterial, std::less<>>;
+using Library = std::map<std::string, MtlMaterial>;
 
 // At most 20 notes, each once, and how many there would have been.
 class Notes {
 public:
-    void add(std::string note) {
+    void add(const std::string& note) {
         if (std::find(notes_.begin(), notes_.end(), note) != notes_.end()) return;
-        if (++count_ <= 20) notes_.push_back(std::move(note));
+        if (++count_ <= 20) notes_.push_back(note);
     }
     std::vector<std::string> take() {
         if (count_ > 20) notes_.push_back("and " + std::to_string(count_ - 20) + " more like these");
@@ -861,22 +598,17 @@ bool is_number(std::string_view word) {
 // What is left of "-bm 1 -s 2 2 2 the file.tga" without the options. What looks like an option but is none of the
 // format's belongs to the name.
 std::string_view without_options(std::string_view text) {
+    static const std::map<std::string_view, int> options = {  // one word, or up to so many numbers
+        {"-blendu", 1}, {"-blendv", 1}, {"-cc", 1}, {"-clamp", 1}, {"-imfchan", 1}, {"-texres", 1}, {"-bm", 1},
+        {"-boost", 1},  {"-type", 1},   {"-mm", 2}, {"-o", 3},     {"-s", 3},       {"-t", 3}};
     for (;;) {
         std::string_view rest = text;
-        const std::string_view option = take_word(rest);
-        const auto is_one_of = [&](std::initializer_list<std::string_view> list) {
-            return std::find(list.begin(), list.end(), option) != list.end();
-        };
-        if (is_one_of({"-blendu", "-blendv", "-cc", "-clamp", "-imfchan", "-texres", "-bm", "-boost", "-type"})) {
-            take_word(rest);
-        } else if (is_one_of({"-mm", "-o", "-s", "-t"})) {  // one to three numbers; two for -mm
-            for (int i = 0; i < (option == "-mm" ? 2 : 3); i++) {
-                std::string_view after = rest;
-                if (!is_number(take_word(after))) break;
-                rest = after;
-            }
-        } else {
-            return text;
+        const auto option = options.find(take_word(rest));
+        if (option == options.end()) return text;
+        for (int i = 0; i < option->second; i++) {
+            std::string_view after = rest;
+            if (!is_number(take_word(after)) && option->second > 1) break;
+            rest = after;
         }
         text = rest;
     }
@@ -888,66 +620,64 @@ fs::path beside(const fs::path& file, std::string name) {
     return (file.parent_path() / name).lexically_normal();
 }
 
-vec3 read_Kd(TextFile& in, Notes& notes, const fs::path& library) {
-    in.skip_blanks();
-    if (in.peek() == 's' || in.peek() == 'x') {
-        const std::string word(in.word());
-        if (word != "spectral" && word != "xyz") in.fail(in_quotes(word) + " is no number");
-        notes.add(library.filename().string() + ":" + std::to_string(in.line()) + ": Kd " + word +
-                  " is not known, white is used");
-        in.skip_statement();
-        return {1, 1, 1};
-    }
-    vec3 Kd;
+bool is_there(const fs::path& path) {
+    std::error_code ignored;
+    return fs::exists(path, ignored);
+}
+
+vec3 read_Kd(Scanner& in) {
+    double values[3];
     int n = 0;
-    for (; !in.at_end(); in.skip_blanks()) {
-        const double value = in.real();
-        if (n < 3) Kd[n] = std::clamp(value, 0., 1.);
-        n++;
+    for (in.skip_blanks(); !in.at_end(); in.skip_blanks(), n++) {
+        const double value = std::clamp(in.real(), 0., 1.);
+        if (n < 3) values[n] = value;
     }
     if (n != 1 && n != 3) in.fail_statement("Kd needs three numbers, or one");
-    return n == 1 ? vec3{Kd[0], Kd[0], Kd[0]} : Kd;
+    return n == 1 ? vec3{values[0], values[0], values[0]} : vec3{values[0], values[1], values[2]};
 }
 
 // Adds the file's materials to the others; one of the same name is replaced.
-void read_mtl(const fs::path& path, MtlMaterials& materials, Notes& notes) {
-    TextFile in(path);
-    MtlMaterial* material = nullptr;
-    while (in.next_line()) {
-        if (in.at_end()) continue;
-        const std::string word(in.word());
+void read_mtl(const fs::path& path, Library& library) {
+    static const std::map<std::string_view, int> maps = {
+        {"map_Kd", diffuse_map}, {"map_Ks", specular_map}, {"map_Ke", glow_map}, {"norm", tangent_map},
+        {"map_Bump", bump_map},  {"map_bump", bump_map},   {"bump", bump_map}};
+    const std::string text = read_text(path);
+    MtlMaterial before_the_first, *material = &before_the_first;
+    for (Scanner in(path, text); !in.is_done(); in.next_line()) {
+        const auto note = [&](const std::string& what) {
+            material->notes.push_back(path.filename().string() + ":" + std::to_string(in.line()) + ": " + what);
+        };
+        const std::string_view word = in.word();
+        const auto map = maps.find(word);
         if (word == "newmtl") {
-            material = &materials[std::string(in.rest())];
+            material = &library[in.rest()];
             *material = {};
-            material->mtl = path;
-            continue;
-        }
-        static const std::map<std::string, Map, std::less<>> words = {
-            {"map_Kd", diffuse_map}, {"map_Ks", specular_map}, {"map_Ke", glow_map}, {"norm", normal_map},
-            {"map_Bump", bump_map},  {"map_bump", bump_map},   {"bump", bump_map}};
-        const auto map = words.find(word);
-        if (word == "Kd") {
-            const vec3 Kd = read_Kd(in, notes, path);
-            if (material) material->Kd = Kd;
-        } else if (map != words.end() && material) {
-            const std::int64_t line = in.line();
-            material->maps[map->second] = {std::string(without_options(in.rest())), line};
-        } else {
-            in.skip_statement();
+        } else if (word == "Kd" && (in.peek_word() == "spectral" || in.peek_word() == "xyz")) {
+            note("Kd " + std::string(in.peek_word()) + " is not known, white is used");
+        } else if (word == "Kd") {
+            material->Kd = read_Kd(in);
+        } else if (map != maps.end()) {
+            const std::string all = in.rest(), name(without_options(all));
+            const fs::path file = beside(path, name);
+            std::string extension = file.extension().string();
+            for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+            if (name.empty()) continue;
+            if (extension != ".tga") note(printable(name) + " is not a TGA file, left out");
+            else if (!is_there(file)) note(printable(name) + " does not exist, left out");
+            else material->maps[map->second] = file.string();
         }
     }
 }
 
 // Reads the files that the mtllib lines name: each line is one name, which may contain blanks, or else several.
-MtlMaterials read_libraries(const fs::path& obj, const std::vector<std::string>& lines, Notes& notes) {
-    MtlMaterials materials;
+Library read_libraries(const fs::path& obj, const std::vector<std::string>& lines, Notes& notes) {
+    Library library{{"", {}}};  // the default material
     std::set<fs::path> seen;
     const auto read = [&](std::string_view name) {
         const fs::path path = beside(obj, std::string(name));
-        std::error_code ignored;
-        if (!fs::exists(path, ignored)) return false;
-        if (fs::is_other(path, ignored)) throw std::runtime_error(path.string() + ": is not a file");  // a pipe may never end
-        if (seen.insert(path).second) read_mtl(path, materials, notes);
+        if (!is_there(path)) return false;
+        if (fs::is_other(path)) throw std::runtime_error(path.string() + ": is not a file");  // a pipe may never end
+        if (seen.insert(path).second) read_mtl(path, library);
         return true;
     };
     for (const std::string& line : lines) {
@@ -962,56 +692,91 @@ MtlMaterials read_libraries(const fs::path& obj, const std::vector<std::string>&
         if (!several) missing.assign({line});
         for (const std::string_view name : missing) notes.add("there is no material file " + in_quotes(name));
     }
-    return materials;
+    return library;
+}
+
+// Sorts the faces, stably, by material, and fills MATERIALS with those that faces use, in the order of their first
+// face. What the library does not define is all one default material, without a name.
+std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, std::vector<Material>& materials,
+                                            Notes& notes) {
+    std::map<std::string, int> indices;
+    std::vector<Model::Group> pieces, groups;
+    obj.runs.push_back({static_cast<int>(obj.corners.size() / 3), ""});
+    for (int i = 0; i + 1 < count(obj.runs); i++) {
+        const int begin = obj.runs[i].face, end = obj.runs[i + 1].face;
+        if (begin == end) continue;
+        std::string name = obj.runs[i].material;
+        if (!library.contains(name)) {
+            notes.add("there is no material " + in_quotes(name));
+            name.clear();
+        }
+        const auto [entry, is_new] = indices.emplace(name, count(materials));
+        if (is_new) materials.push_back({name, library.at(name).Kd, {}, {}, {}, {}, {}});
+        pieces.push_back({begin, end, entry->second});
+    }
+    std::stable_sort(pieces.begin(), pieces.end(), [](auto& a, auto& b) { return a.material < b.material; });
+
+    std::vector<Corner> sorted;
+    if (materials.size() > 1) sorted.reserve(obj.corners.size());
+    int face = 0;
+    for (const auto& [begin, end, material] : pieces) {
+        if (groups.empty() || groups.back().material != material) groups.push_back({face, face, material});
+        groups.back().end = face += end - begin;
+        if (materials.size() > 1)
+            sorted.insert(sorted.end(), &obj.corners[begin * std::size_t{3}], &obj.corners[end * std::size_t{3}]);
+    }
+    if (materials.size() > 1) obj.corners = std::move(sorted);
+    return groups;
 }
 
 // ---- textures ----
 
-// Pictures to be decoded, each once, however many materials use it.
-class TextureFiles {
-public:
-    int add(const fs::path& path) {
-        const auto [entry, is_new] = indices_.emplace(path.lexically_normal(), to_int(files_.size()));
-        if (is_new) files_.push_back(path);
-        return entry->second;
-    }
-
-    // Decodes them all, in as many threads as there are cores. What is thrown is the error of the first bad file in the
-    // order of addition, whatever thread was the first to see one.
-    std::vector<TGAImage> decode() const {
-        std::vector<TGAImage> images(files_.size());
-        std::vector<std::exception_ptr> errors(files_.size());
-        std::atomic<std::size_t> next = 0;
-        const auto work = [&] {
-            for (std::size_t i; (i = next++) < files_.size();) {
-                try {
-                    images[i] = TGAImage::read_tga_file(files_[i]);
-                } catch (...) {
-                    errors[i] = std::current_exception();
-                }
-            }
-        };
-        {
-            std::vector<std::jthread> helpers;
-            const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
-            try {
-                while (helpers.size() + 1 < std::min(cores, files_.size())) helpers.emplace_back(work);
-            } catch (const std::system_error&) {
-                // no more threads to be had: those that run do the work
-            }
-            work();
-        }
-        for (const std::exception_ptr& error : errors)
-            if (error) std::rethrow_exception(error);
-        return images;
-    }
-
-    const std::vector<fs::path>& list() const { return files_; }
-
-private:
-    std::map<fs::path, int> indices_;
-    std::vector<fs::path> files_;
+struct Texture {  // a picture, and the maps that it becomes
+    struct Use {
+        int material;
+        TGAImage Material::*map;
+    };
+    std::string path;
+    std::vector<Use> uses;
 };
+
+// The maps of each group's material: from its .mtl, and where that has none, from the pictures beside the model.
+std::vector<Texture> plan_textures(const fs::path& obj, const std::vector<Model::Group>& groups,
+                                   const std::vector<Corner>& corners, const std::vector<Material>& materials,
+                                   const Library& library, NormalMap wanted, Notes& notes) {
+    std::array<std::string, map_count> pictures_beside;
+    for (int i = 0; i < map_count; i++) {
+        const fs::path path = fs::path(obj).replace_extension() += map_kinds[i].suffix;
+        if (is_there(path)) pictures_beside[i] = path.lexically_normal().string();
+    }
+    std::vector<Texture> textures;
+    std::map<std::string, int> indices;
+    for (const Model::Group& g : groups) {
+        const std::string& name = materials[g.material].name;
+        const MtlMaterial& mtl = library.at(name);
+        for (const std::string& note : mtl.notes) notes.add(note);
+        std::array<std::string, map_count> maps = pictures_beside;
+        for (const int i : {diffuse_map, bump_map, tangent_map, specular_map, glow_map})
+            if (!mtl.maps[i].empty()) maps[i == bump_map ? tangent_map : i] = mtl.maps[i];
+        if (!maps[normal_map].empty() && !maps[tangent_map].empty())
+            maps[wanted == NormalMap::object ? tangent_map : normal_map].clear();
+
+        const bool has_uvs = std::any_of(&corners[g.begin * std::size_t{3}], &corners[g.end * std::size_t{3}],
+                                         [](const Corner& c) { return c.uv >= 0; });
+        for (int i = 0; i < map_count; i++) {
+            if (maps[i].empty()) continue;
+            if (!has_uvs) {
+                notes.add((name.empty() ? "" : "material " + in_quotes(name) + ": ") +
+                          "no texture coordinates, so no textures");
+                break;
+            }
+            const auto [entry, is_new] = indices.emplace(maps[i], count(textures));
+            if (is_new) textures.push_back({maps[i], {}});
+            textures[entry->second].uses.push_back({g.material, map_kinds[i].map});
+        }
+    }
+    return textures;
+}
 
 TGAImage widened(const TGAImage& grey) {
     TGAImage out(grey.width(), grey.height(), TGAImage::RGB);
@@ -1020,177 +785,33 @@ TGAImage widened(const TGAImage& grey) {
     return out;
 }
 
-// Fills the materials' maps: from their .mtl, and where that has none, from the pictures beside the model.
-class Texturing {
-public:
-    Texturing(const fs::path& obj, NormalMap wanted, Notes& notes) : obj_(obj), wanted_(wanted), notes_(notes) {
-        const auto if_there = [&](const char* suffix) {
-            fs::path path = obj;
-            path.replace_extension();
-            path += suffix;
-            std::error_code ignored;
-            return fs::exists(path, ignored) ? path : fs::path();
-        };
-        beside_ = {if_there("_diffuse.tga"), if_there("_nm.tga"), if_there("_nm_tangent.tga"), if_there("_spec.tga"),
-                   if_there("_glow.tga")};
-    }
-
-    // Notes what the material needs. MTL is null for the default material.
-    void plan(std::size_t material, const MtlMaterial* mtl, const std::string& name, bool has_uvs) {
-        std::array<fs::path, map_count> named;
-        if (mtl)
-            for (std::size_t i = 0; i < map_count; i++) named[i] = usable(*mtl, mtl->maps[i]);
-        if (named[normal_map].empty()) named[normal_map] = named[bump_map];
-
-        Maps maps = beside_;
-        const auto prefer = [](fs::path& map, const fs::path& other) {
-            if (!other.empty()) map = other;
-        };
-        prefer(maps.diffuse, named[diffuse_map]);
-        prefer(maps.tangent, named[normal_map]);
-        prefer(maps.specular, named[specular_map]);
-        prefer(maps.glow, named[glow_map]);
-        if (!maps.object.empty() && !maps.tangent.empty())
-            (wanted_ == NormalMap::object ? maps.tangent : maps.object).clear();
-
-        bool left_out = false;
-        const auto use = [&](const fs::path& path, TGAImage Material::*slot) {
-            if (path.empty()) return;
-            if (has_uvs) uses_.push_back({files_.add(path), material, slot});
-            else left_out = true;
-        };
-        use(maps.diffuse, &Material::diffuse);
-        use(maps.object, &Material::normal);
-        use(maps.tangent, &Material::tangent);
-        use(maps.specular, &Material::specular);
-        use(maps.glow, &Material::glow);
-        if (left_out)
-            notes_.add((name.empty() ? "" : "material " + in_quotes(name) + ": ") +
-                       "no texture coordinates, so no textures");
-    }
-
-    void load(std::vector<Material>& materials) const {
-        std::vector<TGAImage> images = files_.decode();
-        std::vector<int> users(images.size(), 0);
-        for (const Use& use : uses_) users[to_size(use.file)]++;
-        std::uint64_t copied = 0;
-        for (const Use& use : uses_) {
-            TGAImage& image = images[to_size(use.file)];
-            TGAImage& map = materials[use.material].*use.slot;
-            const bool grey = image.bytespp() == 1, last = --users[to_size(use.file)] == 0;
-            if (grey && (use.slot == &Material::normal || use.slot == &Material::tangent)) {
-                notes_.add(files_.list()[to_size(use.file)].filename().string() +
-                           " is grey, so no normal map: left out");
+// Decodes each picture once, some at the same time, and hands it to the materials. What is thrown is the error of the
+// first bad one in their order.
+void load_textures(const std::vector<Texture>& textures, const fs::path& obj, std::vector<Material>& materials,
+                   Notes& notes) {
+    constexpr std::uint64_t max_copied = std::uint64_t{1} << 30;
+    std::uint64_t copied = 0;
+    const int ahead = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    std::vector<std::future<TGAImage>> images(textures.size());
+    for (int i = 0, started = 0; i < count(textures); i++) {
+        for (; started < std::min(i + ahead, count(textures)); started++)
+            images[started] = std::async(TGAImage::read_tga_file, textures[started].path);
+        TGAImage image = images[i].get();
+        for (const Texture::Use& use : textures[i].uses) {
+            const bool is_grey = image.bytespp() == 1, is_last = &use == &textures[i].uses.back();
+            if (is_grey && (use.map == &Material::normal || use.map == &Material::tangent)) {
+                notes.add(fs::path(textures[i].path).filename().string() + " is grey, so no normal map: left out");
                 continue;
             }
-            const bool widen = grey && use.slot != &Material::specular;
-            if (!last)
-                copied += static_cast<std::uint64_t>(image.width()) * static_cast<std::uint64_t>(image.height()) *
-                          (widen ? 3 : static_cast<std::uint64_t>(image.bytespp()));
+            const bool widens = is_grey && use.map != &Material::specular;
+            if (!is_last) copied += std::uint64_t{1} * image.width() * image.height() * (widens ? 3 : image.bytespp());
             if (copied > max_copied)
-                throw std::runtime_error(obj_.string() +
+                throw std::runtime_error(obj.string() +
                                          ": its materials share pictures that would take more than 1 GiB in copies");
-            if (widen) map = widened(image);
-            else if (last) map = std::move(image);
-            else map = image;
+            TGAImage& map = materials[use.material].*use.map;
+            map = widens ? widened(image) : is_last ? std::move(image) : image;
         }
     }
-
-private:
-    static constexpr std::uint64_t max_copied = std::uint64_t{1} << 30;
-    struct Use {
-        int file;
-        std::size_t material;
-        TGAImage Material::*slot;
-    };
-    struct Maps {  // empty where there is none
-        fs::path diffuse, object, tangent, specular, glow;
-    };
-
-    // The path of a map that can be loaded; else it is empty, with a note.
-    fs::path usable(const MtlMaterial& of, const MtlMaterial::Name& name) const {
-        if (name.file.empty()) return {};
-        const auto note = [&](const char* what) {
-            notes_.add(of.mtl.filename().string() + ":" + std::to_string(name.line) + ": " + printable(name.file) +
-                       what);
-        };
-        const fs::path path = beside(of.mtl, name.file);
-        std::string extension = path.extension().string();
-        for (char& c : extension)
-            if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-        std::error_code ignored;
-        if (extension != ".tga") note(" is not a TGA file, left out");
-        else if (!fs::exists(path, ignored)) note(" does not exist, left out");
-        else return path;
-        return {};
-    }
-
-    fs::path obj_;
-    NormalMap wanted_;
-    Notes& notes_;
-    Maps beside_;  // the pictures beside the model
-    TextureFiles files_;
-    std::vector<Use> uses_;
-};
-
-// ---- materials for faces ----
-
-struct Piece {  // the faces [begin,end) of the file share a material
-    int begin, end, material;
-};
-
-// Fills MATERIALS with those that faces use, in the order of their first face. What the .mtl does not define is all one
-// default material, without a name.
-std::vector<Piece> assign_materials(const Obj& obj, const MtlMaterials& library, std::vector<Material>& materials,
-                                    Notes& notes) {
-    const std::vector<std::string>& names = obj.materials.list();
-    std::vector<int> index(names.size(), -1);
-    int default_index = -1;
-    std::vector<Piece> pieces;
-    for (std::size_t i = 0; i < obj.runs.size(); i++) {
-        const int begin = obj.runs[i].face, name = obj.runs[i].name;
-        const int end = i + 1 < obj.runs.size() ? obj.runs[i + 1].face : to_int(obj.corners.size() / 3);
-        if (begin == end) continue;
-        int& known = name < 0 ? default_index : index[to_size(name)];
-        if (known < 0) {
-            const auto found = name < 0 ? library.end() : library.find(names[to_size(name)]);
-            if (name >= 0 && found == library.end())
-                notes.add("there is no material " + in_quotes(names[to_size(name)]));
-            int& slot = found == library.end() ? default_index : known;
-            if (slot < 0) {
-                slot = to_int(materials.size());
-                materials.emplace_back();
-                if (found != library.end()) {
-                    materials.back().name = found->first;
-                    materials.back().Kd = found->second.Kd;
-                }
-            }
-            known = slot;
-        }
-        pieces.push_back({begin, end, known});
-    }
-    return pieces;
-}
-
-// Sorts the faces, stably, by material.
-std::vector<Model::Group> group_by_material(std::vector<Piece> pieces, std::vector<Corner>& corners) {
-    const auto before = [](const Piece& a, const Piece& b) { return a.material < b.material; };
-    if (!std::is_sorted(pieces.begin(), pieces.end(), before)) {
-        std::stable_sort(pieces.begin(), pieces.end(), before);
-        std::vector<Corner> sorted;
-        sorted.reserve(corners.size());
-        for (const Piece& p : pieces)
-            sorted.insert(sorted.end(), corners.begin() + 3 * std::ptrdiff_t{p.begin},
-                          corners.begin() + 3 * std::ptrdiff_t{p.end});
-        corners = std::move(sorted);
-    }
-    std::vector<Model::Group> groups;
-    int face = 0;
-    for (const Piece& p : pieces) {
-        if (groups.empty() || groups.back().material != p.material) groups.push_back({face, face, p.material});
-        groups.back().end = face += p.end - p.begin;
-    }
-    return groups;
 }
 
 }  // namespace
@@ -1198,30 +819,23 @@ std::vector<Model::Group> group_by_material(std::vector<Piece> pieces, std::vect
 // ---- the model ----
 
 Model::Model(const fs::path& path, NormalMap wanted) {
-    Obj obj = ObjReader(path).read();
+    Obj obj = ObjParser(path, read_text(path)).parse();
+    if (obj.corners.empty()) throw std::runtime_error(path.string() + ": no faces");
     Notes notes;
 
     PolygonCutter cutter;
     int crossed = 0;
     for (const Obj::Polygon& p : obj.polygons)
-        crossed += !cutter.cut(obj.verts, &obj.corners[to_size(p.face) * 3], p.corners);
+        crossed += !cutter.cut(obj.verts, &obj.corners[p.face * std::size_t{3}], p.corners);
     if (crossed > 0)
         notes.add(std::to_string(crossed) + (crossed == 1 ? " polygon crosses itself" : " polygons cross themselves") +
                   " or cannot be cut well");
     if (obj.lacks_normals) make_normals(obj.verts, obj.corners, obj.normals);
 
-    const MtlMaterials library = read_libraries(path, obj.libraries.list(), notes);
-    Texturing texturing(path, wanted, notes);
-    groups_ = group_by_material(assign_materials(obj, library, materials_, notes), obj.corners);
-    for (const Group& g : groups_) {
-        const Material& material = materials_[to_size(g.material)];
-        const auto found = library.find(material.name);
-        const bool has_uvs =
-            std::any_of(obj.corners.begin() + 3 * std::ptrdiff_t{g.begin},
-                        obj.corners.begin() + 3 * std::ptrdiff_t{g.end}, [](const Corner& c) { return c.uv >= 0; });
-        texturing.plan(to_size(g.material), found != library.end() ? &found->second : nullptr, material.name, has_uvs);
-    }
-    texturing.load(materials_);
+    const Library library = read_libraries(path, obj.libraries, notes);
+    groups_ = group_by_material(obj, library, materials_, notes);
+    const auto textures = plan_textures(path, groups_, obj.corners, materials_, library, wanted, notes);
+    load_textures(textures, path, materials_, notes);
 
     verts_ = std::move(obj.verts);
     normals_ = std::move(obj.normals);
@@ -1232,27 +846,23 @@ Model::Model(const fs::path& path, NormalMap wanted) {
 
 bool Model::fit() {
     if (corners_.empty()) return false;
-    vec3 low = verts_[to_size(corners_[0].vert)], high = low;
-    for (const Corner& c : corners_) {
-        const vec3& v = verts_[to_size(c.vert)];
+    vec3 low = vert(0, 0), high = low;
+    for (const Corner& c : corners_)
         for (int i = 0; i < 3; i++) {
-            low[i] = std::min(low[i], v[i]);
-            high[i] = std::max(high[i], v[i]);
+            low[i] = std::min(low[i], verts_[c.vert][i]);
+            high[i] = std::max(high[i], verts_[c.vert][i]);
         }
-    }
     const double extent = std::max(largest(low), largest(high));
     constexpr double pixel = 2 / (.75 * 16384);  // [-1,1] are three quarters of a picture's side
     const bool invisible = largest(high - low) < pixel && !(low == high);
     if (extent <= 1 && !invisible) return false;
 
-    // First by a power of two, so that the largest coordinate is in [1,2) and nothing overflows. From there on the
-    // numbers are the same whatever power of two the model is multiplied by, and so are their roundings. (What is denormal
-    // comes out smaller: 2^1023 is the largest power of two.)
-    const double unit = std::scalbn(1., std::min(-std::ilogb(extent), 1023));
+    // First the largest coordinate is brought into [1,2), so that nothing overflows. From there on the numbers are the
+    // same whatever power of two the model is multiplied by, and so are their roundings.
+    const double unit = unit_for(extent);
     low = low * unit;
     high = high * unit;
-    const vec3 sides = high - low;
-    const double side = std::max({sides.x, sides.y, sides.z});
+    const double side = largest(high - low);
     for (vec3& v : verts_) {
         v = v * unit;
         v = (v - low) - (high - v);  // twice the way from the centre, which itself may be no double
@@ -1268,19 +878,19 @@ void Model::move(const vec3& by) {
 }
 
 std::string missing_maps(const std::vector<Model>& models) {
-    const auto used = [&](auto&& has) {
-        for (const Model& model : models)
-            for (const Material& m : model.materials())
-                if (has(m)) return true;
-        return false;
-    };
+    constexpr struct {
+        const char* name;
+        TGAImage Material::*map, Material::*other;
+    } kinds[] = {{"diffuse", &Material::diffuse, &Material::diffuse},
+                 {"normal_map", &Material::normal, &Material::tangent},
+                 {"specular", &Material::specular, &Material::specular},
+                 {"glow", &Material::glow, &Material::glow}};
     std::string names;
-    const auto check = [&](const char* name, auto&& has) {
-        if (!used(has)) names += (names.empty() ? "" : ",") + std::string(name);
-    };
-    check("diffuse", [](const Material& m) { return !m.diffuse.empty(); });
-    check("normal_map", [](const Material& m) { return !m.normal.empty() || !m.tangent.empty(); });
-    check("specular", [](const Material& m) { return !m.specular.empty(); });
-    check("glow", [](const Material& m) { return !m.glow.empty(); });
+    for (const auto& kind : kinds) {
+        bool used = false;
+        for (const Model& model : models)
+            for (const Material& m : model.materials()) used = used || !(m.*kind.map).empty() || !(m.*kind.other).empty();
+        if (!used) names.append(names.empty() ? "" : ",").append(kind.name);
+    }
     return names;
 }

@@ -104,7 +104,8 @@ template <class T>
 static void compare_lanes(std::mt19937& rng) {
     constexpr T inf = std::numeric_limits<T>::infinity(), nan = std::numeric_limits<T>::quiet_NaN();
     constexpr T least = std::numeric_limits<T>::denorm_min();
-XX
+    const T special[] = {0,   -T(0), 1,   -1,  T(.5), T(2.5), T(-2.5), T(1e30), T(-1e-30), least,
+                         inf, -inf,  nan, 255, T(2e9), T(-2e9)};
     T x[lanes], y[lanes];
     for (T* each : {x, y})
         for (int i = 0; i < lanes; i++)
