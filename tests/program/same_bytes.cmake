@@ -59,7 +59,7 @@ function(compare scene)
       set(threads 1)
     endif()
     execute_process(COMMAND ${run_${build}} --quiet -o . --threads ${threads} ${ARGN} WORKING_DIRECTORY ${FOLDER}
-                    RESULT_VARIABLE status OUTPUT_FILE said.txt ERROR_FILE said.txt TIMEOUT 60)
+                    RESULT_VARIABLE status OUTPUT_FILE said.txt ERROR_FILE said.txt TIMEOUT 30)
     file(GLOB pictures ${FOLDER}/*.tga)
     set(drawn "")
     foreach(picture ${pictures})
