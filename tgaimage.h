@@ -24,8 +24,9 @@ public:
     // Reads types 1, 2, 3, 9, 10, 11 at 8, 15, 16, 24 and 32 bits, all four origins, with or without image ID, colour map
     // and 2.0 footer. A colour-mapped picture comes out in the format of its map; 15 and 16 bits become RGB (RGBA where
     // the header declares an attribute bit), five bits scaled to eight.
-    // Throws std::runtime_error "FILE: what" or "FILE: byte N: what". Allocates at most 256 times the size of the file,
-    // which is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map), and 64 KiB.
+    // Throws std::runtime_error "FILE: what" or "FILE: byte N: what". Allocates at most 257 times the size of the file,
+    // which is held whole, and 4 KiB: 256 times is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4
+    // bytes through a colour map).
     static TGAImage read_tga_file(const std::filesystem::path& path);
 
     // Writes the picture to PATH: TGAFile(*this, path, rle).commit(), see below.
@@ -54,13 +55,10 @@ public:
 
 private:
     bool inside(int x, int y) const { return x >= 0 && y >= 0 && x < w_ && y < h_; }
-    std::size_t offset(int x, int y) const {
-        return (static_cast<std::size_t>(y) * static_cast<std::size_t>(w_) + static_cast<std::size_t>(x)) *
-               static_cast<std::size_t>(bpp_);
-    }
+    std::size_t offset(int x, int y) const { return (std::size_t{1} * y * w_ + x) * bpp_; }
 
     int w_ = 0, h_ = 0, bpp_ = 0;
-    std::vector<std::uint8_t> data_;  // rows from the bottom up
+    std::vector<std::uint8_t> data_;  // rows from the bottom up, and 3 bytes more: four can be read at every pixel
 };
 
 // A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. All its bytes go to a
