@@ -27,16 +27,10 @@
 constexpr int lanes = 1;
 #elif defined(__AVX__)
 constexpr int lanes = 8;
-#define ONE_OF_TWO 0, 2, 4, 6, 8, 10, 12, 14
-#define EACH_TWICE_LOW 0, 0, 1, 1, 2, 2, 3, 3
-#define EACH_TWICE_HIGH 4, 4, 5, 5, 6, 6, 7, 7
-#define ALL_OF_BOTH 0, 1, 2, 3, 4, 5, 6, 7
+#define BOTH_HALVES 0, 1, 2, 3, 4, 5, 6, 7
 #else
 constexpr int lanes = 4;
-#define ONE_OF_TWO 0, 2, 4, 6
-#define EACH_TWICE_LOW 0, 0, 1, 1
-#define EACH_TWICE_HIGH 2, 2, 3, 3
-#define ALL_OF_BOTH 0, 1, 2, 3
+#define BOTH_HALVES 0, 1, 2, 3
 #endif
 
 template <class T, int n>
@@ -94,114 +88,82 @@ struct pack {
 using real = pack<float>;
 using coord = pack<double>;
 
-struct mask {
-    pack<std::int32_t>::part m;  // 0 is no
-    mask() = default;
-    INLINED mask(bool b) : m((b ? -1 : 0) - pack<std::int32_t>::part{}) {}
-    INLINED explicit mask(const pack<std::int32_t>& a) : m(a.p[0] != 0) {}
-    INLINED explicit mask(const pack<std::int64_t>& a) {
-#if defined(__GNUC__)
-        using halves = pack<std::int32_t>::part;
-        m = __builtin_shufflevector((halves)a.p[0], (halves)a.p[1], ONE_OF_TWO);
+// In each lane what static_cast gives, between types of four and of eight bytes.
+template <class To, class From>
+INLINED pack<To> converted(const pack<From>& a) {
+    pack<To> out;
+#if !defined(__GNUC__)
+    out.p[0] = static_cast<To>(a.p[0]);
 #else
-        m = a.p[0] != 0;
+    if constexpr (sizeof(To) == sizeof(From)) {
+        for (int i = 0; i < a.parts; i++) out.p[i] = __builtin_convertvector(a.p[i], typename pack<To>::part);
+    } else if constexpr (sizeof(To) < sizeof(From)) {
+        using half = typename vector_of<To, lanes / 2>::type;
+        const half low = __builtin_convertvector(a.p[0], half), high = __builtin_convertvector(a.p[1], half);
+        out.p[0] = __builtin_shufflevector(low, high, BOTH_HALVES);
+    } else {
+        typename vector_of<From, lanes / 2>::type halves[2];
+        std::memcpy(halves, a.p, sizeof halves);
+        for (int i = 0; i < 2; i++) out.p[i] = __builtin_convertvector(halves[i], typename pack<To>::part);
+    }
 #endif
-    }
-    INLINED bool operator[](int i) const {
-        std::int32_t values[lanes];
-        std::memcpy(values, &m, sizeof m);
-        return values[i] != 0;
-    }
-    INLINED friend mask operator!(const mask& a) { return mask(a.m == 0, 0); }
-    INLINED friend mask operator&(const mask& a, const mask& b) { return mask(a.m & b.m, 0); }
-    INLINED friend mask operator|(const mask& a, const mask& b) { return mask(a.m | b.m, 0); }
+    return out;
+}
+template <class T>
+INLINED real to_real(const pack<T>& a) { return converted<float>(a); }
+template <class T>
+INLINED coord to_coord(const pack<T>& a) { return converted<double>(a); }
+template <class T>
+INLINED pack<std::int32_t> to_int(const pack<T>& a) { return converted<std::int32_t>(a); }  // towards zero
 
-private:
-    INLINED mask(const pack<std::int32_t>::part& a, int) : m(a) {}
+struct mask {
+    pack<std::int32_t> m;  // 0 is no
+    mask() = default;
+    INLINED mask(bool b) : m(b ? -1 : 0) {}
+    INLINED explicit mask(const pack<std::int32_t>& a) { m.p[0] = a.p[0] != 0; }
+    INLINED bool operator[](int i) const { return m[i] != 0; }
+    INLINED friend mask operator!(mask a) {
+        a.m.p[0] = a.m.p[0] == 0;
+        return a;
+    }
+    INLINED friend mask operator&(mask a, const mask& b) {
+        a.m.p[0] &= b.m.p[0];
+        return a;
+    }
+    INLINED friend mask operator|(mask a, const mask& b) {
+        a.m.p[0] |= b.m.p[0];
+        return a;
+    }
 };
 
 INLINED bool any(const mask& a) {
     std::int64_t values[lanes / 2 + lanes % 2] = {}, all = 0;
-    std::memcpy(values, &a.m, sizeof a.m);
+    std::memcpy(values, a.m.p, sizeof a.m.p);
     for (const std::int64_t v : values) all |= v;
     return all != 0;
 }
 
-#define COMPARING(T, integer, op)                                                    \
-    INLINED mask operator op(const pack<T>& a, const pack<T>& b) {                   \
-        pack<integer> out;                                                           \
-        for (int i = 0; i < pack<T>::parts; i++) out.p[i] = a.p[i] op b.p[i];        \
-        return mask(out);                                                            \
+#define COMPARING(T, op)                                                                              \
+    INLINED mask operator op(const pack<T>& a, const pack<T>& b) {                                    \
+        pack<std::conditional_t<sizeof(T) == 8, std::int64_t, std::int32_t>> out;                     \
+        for (int i = 0; i < a.parts; i++) out.p[i] = a.p[i] op b.p[i];                                \
+        return mask(to_int(out));                                                                     \
     }
-COMPARING(float, std::int32_t, <) COMPARING(float, std::int32_t, >) COMPARING(float, std::int32_t, ==)
-COMPARING(std::int32_t, std::int32_t, <) COMPARING(std::int32_t, std::int32_t, >)
-COMPARING(double, std::int64_t, <) COMPARING(double, std::int64_t, >) COMPARING(double, std::int64_t, ==)
+COMPARING(float, <) COMPARING(float, >) COMPARING(float, ==)
+COMPARING(double, <) COMPARING(double, >) COMPARING(double, ==)
+COMPARING(std::int32_t, <) COMPARING(std::int32_t, >)
 #undef COMPARING
 
 // a where the mask says yes, b elsewhere. Numbers alone are taken for reals.
-INLINED real select(const mask& m, const real& a, const real& b) {
-    real out;
-    out.p[0] = m.m ? a.p[0] : b.p[0];
-    return out;
-}
 template <class T>
-    requires(sizeof(T) == 4)
-INLINED pack<T> select(const mask& m, const pack<T>& a, const pack<T>& b) {
+INLINED pack<T> select(const mask& m, const pack<T>& a, const std::type_identity_t<pack<T>>& b) {
+    using integer = std::conditional_t<sizeof(T) == 8, std::int64_t, std::int32_t>;
+    const pack<integer> wide = converted<integer>(m.m);
     pack<T> out;
-    out.p[0] = m.m ? a.p[0] : b.p[0];
+    for (int i = 0; i < a.parts; i++) out.p[i] = wide.p[i] ? a.p[i] : b.p[i];
     return out;
 }
-INLINED coord select(const mask& m, const std::same_as<coord> auto& a, const coord& b) {
-    coord out;
-#if defined(__GNUC__)
-    using wide = pack<std::int64_t>::part;
-    out.p[0] = (wide)__builtin_shufflevector(m.m, m.m, EACH_TWICE_LOW) ? a.p[0] : b.p[0];
-    out.p[1] = (wide)__builtin_shufflevector(m.m, m.m, EACH_TWICE_HIGH) ? a.p[1] : b.p[1];
-#else
-    out.p[0] = m.m ? a.p[0] : b.p[0];
-#endif
-    return out;
-}
-
-// In each lane what static_cast gives: the nearest float, the same number in double, or the integer towards zero.
-#if defined(__GNUC__)
-template <class To>
-INLINED pack<To> narrowed(const coord& a) {
-    using half = typename vector_of<To, lanes / 2>::type;
-    const half low = __builtin_convertvector(a.p[0], half), high = __builtin_convertvector(a.p[1], half);
-    pack<To> out;
-    out.p[0] = __builtin_shufflevector(low, high, ALL_OF_BOTH);
-    return out;
-}
-template <class T>
-    requires(sizeof(T) == 4)
-INLINED coord to_coord(const pack<T>& a) {
-    typename vector_of<T, lanes / 2>::type halves[2];
-    std::memcpy(halves, a.p, sizeof halves);
-    coord out;
-    for (int i = 0; i < 2; i++) out.p[i] = __builtin_convertvector(halves[i], coord::part);
-    return out;
-}
-INLINED pack<std::int32_t> to_int(const real& a) {
-    pack<std::int32_t> out;
-    out.p[0] = __builtin_convertvector(a.p[0], pack<std::int32_t>::part);
-    return out;
-}
-INLINED real to_real(const pack<std::int32_t>& a) {
-    real out;
-    out.p[0] = __builtin_convertvector(a.p[0], real::part);
-    return out;
-}
-#else
-template <class To>
-INLINED pack<To> narrowed(const coord& a) { return static_cast<To>(a.p[0]); }
-template <class T>
-INLINED coord to_coord(const pack<T>& a) { return a.p[0]; }
-INLINED pack<std::int32_t> to_int(const real& a) { return static_cast<std::int32_t>(a.p[0]); }
-INLINED real to_real(const pack<std::int32_t>& a) { return static_cast<float>(a.p[0]); }
-#endif
-INLINED real to_real(const coord& a) { return narrowed<float>(a); }
-INLINED pack<std::int32_t> to_int(const coord& a) { return narrowed<std::int32_t>(a); }
+INLINED real select(const mask& m, double a, const real& b) { return select(m, real(a), b); }
 
 // f(number) in each lane.
 template <class T, class F>
@@ -305,31 +267,34 @@ INLINED constexpr auto cross(const vec<3, T>& a, const vec<3, S>& b) {
     return vec<3, decltype(a.x * b.y)>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Euclidean length. The vector is first scaled by a power of two (exactly), so neither 1e-200 nor 1e200 is lost.
+// The vector times a power of two (which is exact) so that its square neither overflows nor vanishes, and the exponent
+// that was taken out. What has no length, or no finite one, stays as it is.
 template <int n, typename T>
-T norm(const vec<n, T>& v) {
+std::pair<vec<n, T>, int> moderate(vec<n, T> v) {
     const T squared = dot(v, v);
-    if (squared > T(1e-30) && squared < T(1e30)) return std::sqrt(squared);  // the usual case needs no scaling
+    if (squared > T(1e-30) && squared < T(1e30)) return {v, 0};  // the usual case
     T largest = 0;
     for (int i = 0; i < n; i++) largest = std::fmax(largest, std::fabs(v[i]));
-    if (!(largest > 0) || !std::isfinite(largest)) return std::sqrt(squared);
+    if (!(largest > 0) || !std::isfinite(largest)) return {v, 0};
     const int e = std::ilogb(largest);
-    vec<n, T> scaled = v;
-    for (int i = 0; i < n; i++) scaled[i] = std::scalbn(v[i], -e);
-    return std::scalbn(std::sqrt(dot(scaled, scaled)), e);
+    for (int i = 0; i < n; i++) v[i] = std::scalbn(v[i], -e);
+    return {v, e};
+}
+
+// Euclidean length: neither 1e-200 nor 1e200 is lost.
+template <int n, typename T>
+T norm(const vec<n, T>& v) {
+    const auto [scaled, e] = moderate(v);
+    const T length = std::sqrt(dot(scaled, scaled));
+    return e ? std::scalbn(length, e) : length;
 }
 
 // The unit vector along v; the zero vector stays zero, since it has no direction.
 template <int n, typename T>
 vec<n, T> normalized(const vec<n, T>& v) {
-    const T squared = dot(v, v);
-    if (squared > T(1e-30) && squared < T(1e30)) return v / std::sqrt(squared);
-    T largest = 0;
-    for (int i = 0; i < n; i++) largest = std::fmax(largest, std::fabs(v[i]));
-    if (!(largest > 0) || !std::isfinite(largest)) return v;
-    vec<n, T> scaled = v;
-    for (int i = 0; i < n; i++) scaled[i] = std::scalbn(v[i], -std::ilogb(largest));
-    return scaled / std::sqrt(dot(scaled, scaled));
+    const vec<n, T> scaled = moderate(v).first;
+    const T squared = dot(scaled, scaled);
+    return squared > 0 && std::isfinite(squared) ? scaled / std::sqrt(squared) : v;
 }
 template <int n>
 INLINED vec<n, real> normalized(const vec<n, real>& v) {
