@@ -559,7 +559,7 @@ constexpr struct {
 
 struct MtlMaterial {
     vec3 Kd{1, 1, 1};
-    std::array<std::string, map_count + 1> maps;  // paths, empty where there is none; bump_map is what else tangent_map is
+    std::array<std::string, map_count + 1> maps;  // paths, empty where there is none; bump_map stands in for tangent_map
     std::vector<std::string> notes;
 };
 using Library = std::map<std::string, MtlMaterial>;
@@ -889,7 +889,8 @@ std::string missing_maps(const std::vector<Model>& models) {
     for (const auto& kind : kinds) {
         bool used = false;
         for (const Model& model : models)
-            for (const Material& m : model.materials()) used = used || !(m.*kind.map).empty() || !(m.*kind.other).empty();
+            for (const Material& m : model.materials())
+                used = used || !(m.*kind.map).empty() || !(m.*kind.other).empty();
         if (!used) names.append(names.empty() ? "" : ",").append(kind.name);
     }
     return names;

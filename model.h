@@ -1,6 +1,7 @@
 // model.h: an .obj with its materials and textures, ready to be drawn. It knows nothing of cameras.
 //
-// Faces are triangles after loading: polygons are cut (concave ones correctly), and faces are sorted, stably, by material.
+// Faces are triangles after loading: polygons are cut (concave ones correctly), and faces are sorted, stably, by
+// material.
 #pragma once
 #include "geometry.h"
 #include "tgaimage.h"
@@ -47,21 +48,21 @@ public:
 
     int nverts() const { return static_cast<int>(verts_.size()); }
     int nfaces() const { return static_cast<int>(corners_.size() / 3); }
-    const Corner& corner(int face, int c) const { return corners_[static_cast<std::size_t>(face) * 3 + static_cast<std::size_t>(c)]; }
+    const Corner& corner(int face, int c) const { return corners_[std::size_t{3} * face + c]; }
     const std::vector<vec3>& verts() const { return verts_; }
-    const vec3& vert(int face, int c) const { return verts_[static_cast<std::size_t>(corner(face, c).vert)]; }
-    const vec3& normal(int face, int c) const { return normals_[static_cast<std::size_t>(corner(face, c).normal)]; }  // unit
+    const vec3& vert(int face, int c) const { return verts_[corner(face, c).vert]; }
+    const vec3& normal(int face, int c) const { return normals_[corner(face, c).normal]; }  // unit
     vec2 uv(int face, int c) const {  // (0,0) where the file gives none; v points up
         const int i = corner(face, c).uv;
-        return i < 0 ? vec2{} : uvs_[static_cast<std::size_t>(i)];
+        return i < 0 ? vec2{} : uvs_[i];
     }
 
     const std::vector<Material>& materials() const { return materials_; }
     const std::vector<Group>& groups() const { return groups_; }
 
     // Moves the centre of the bounding box of the used vertices to the origin and scales uniformly so that its largest
-    // half-side is 1, if the box is not within [-1,1]^3 already or is smaller than a pixel of the largest picture. Returns
-    // whether it did, which is a note.
+    // half-side is 1, if the box is not within [-1,1]^3 already or is smaller than a pixel of the largest picture.
+    // Returns whether it did, which is a note.
     bool fit();
 
     void move(const vec3& by);

@@ -93,7 +93,8 @@ Header read_header(const File& file) {
 
     const auto u16 = [b](int i) { return b[i] | b[i + 1] << 8; };
     const Header h{b[0], b[1], b[2], u16(3), u16(5), b[7], u16(12), u16(14), b[16], b[17]};
-    const auto demand = [&](std::initializer_list<int> valid, int value, int byte, const char* what, const char* names) {
+    const auto demand = [&](std::initializer_list<int> valid, int value, int byte, const char* what,
+                            const char* names) {
         if (std::find(valid.begin(), valid.end(), value) == valid.end())
             file.fail(byte, std::string(what) + " " + std::to_string(value) + " is not " + names);
     };
@@ -135,7 +136,7 @@ void repeat(Byte* dst, const Byte* src, int n) {
         else for (int k = 0; k < together; k++) std::memcpy(dst + k * bytes, src, 4);
 }
 
-// Where the picture's i-th pixel is in the file, whose pixels begin at byte AT. Of a run it is asked for the first only.
+// Where the picture's i-th pixel is in the file, whose pixels begin at byte AT. Of a run only the first is asked for.
 std::size_t byte_of(const File& file, std::size_t at, const Header& h, std::size_t i) {
     if (!h.rle()) return at + i * h.pixel_bytes();
     for (;; at++) {

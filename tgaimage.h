@@ -19,14 +19,14 @@ public:
     enum Format { GRAYSCALE = 1, RGB = 3, RGBA = 4 };  // the value is the number of bytes in a pixel
 
     TGAImage() = default;                              // no picture: 0 x 0
-    TGAImage(int width, int height, Format format);    // all bytes 0; 1 to 65535 pixels a side, or std::invalid_argument
+    // All bytes 0. 1 to 65535 pixels a side, or std::invalid_argument.
+    TGAImage(int width, int height, Format format);
 
-    // Reads types 1, 2, 3, 9, 10, 11 at 8, 15, 16, 24 and 32 bits, all four origins, with or without image ID, colour map
-    // and 2.0 footer. A colour-mapped picture comes out in the format of its map; 15 and 16 bits become RGB (RGBA where
-    // the header declares an attribute bit), five bits scaled to eight.
-    // Throws std::runtime_error "FILE: what" or "FILE: byte N: what". Allocates at most 257 times the size of the file,
-    // which is held whole, and 4 KiB: 256 times is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4
-    // bytes through a colour map).
+    // Reads types 1, 2, 3, 9, 10, 11 at 8, 15, 16, 24 and 32 bits, all four origins, with or without image ID, colour
+    // map and 2.0 footer. A colour-mapped picture comes out in the format of its map; 15 and 16 bits become RGB (RGBA
+    // where the header declares an attribute bit), five bits scaled to eight. Throws std::runtime_error "FILE: what" or
+    // "FILE: byte N: what". Allocates at most 257 times the size of the file, which is held whole, and 4 KiB: 256 times
+    // is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map).
     static TGAImage read_tga_file(const std::filesystem::path& path);
 
     // Writes the picture to PATH: TGAFile(*this, path, rle).commit(), see below.
@@ -49,7 +49,8 @@ public:
         for (int i = 0; i < bpp_; i++) pixel(x, y)[i] = c[i];
     }
 
-    // The bytes of the pixel (x,y), unchecked; the next pixel of the row is bytespp() further, the row above width() pixels.
+    // The bytes of the pixel (x,y), unchecked; the next pixel of the row is bytespp() further, the row above width()
+    // pixels.
     std::uint8_t* pixel(int x, int y) { return data_.data() + offset(x, y); }
     const std::uint8_t* pixel(int x, int y) const { return data_.data() + offset(x, y); }
 
@@ -61,11 +62,11 @@ private:
     std::vector<std::uint8_t> data_;  // rows from the bottom up, and 3 bytes more: four can be read at every pixel
 };
 
-// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. All its bytes go to a
-// temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of one.
-// Without commit() the temporary file goes with the object. Of several pictures, commit the first when all of them are
-// constructed: where one does not fit on the disk, none is replaced.
-// Throws std::runtime_error "FILE: what", with the temporary file removed.
+// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. All its bytes go to
+// a temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of
+// one. Without commit() the temporary file goes with the object. Of several pictures, commit the first when all of them
+// are constructed: where one does not fit on the disk, none is replaced. Throws std::runtime_error "FILE: what", with
+// the temporary file removed.
 class TGAFile {
 public:
     TGAFile(const TGAImage& image, const std::filesystem::path& path, bool rle = true);

@@ -151,7 +151,8 @@ TEST("vectors of lanes compute what vectors do") {
         const vec3 u = random_matrix<3>(rng)[0];
         double component[3][lanes];
         for (auto& each : component)
-            for (double& v : each) v = (static_cast<double>(rng()) / 2147483648. - 1) * (k % 10 || rng() % 2 ? 1 : 1e-20);
+            for (double& v : each)
+                v = (static_cast<double>(rng()) / 2147483648. - 1) * (k % 10 || rng() % 2 ? 1 : 1e-20);
         const vec<3, coord> v{coord(component[0]), coord(component[1]), coord(component[2])};
         const auto lane = [](const auto& w, int i) {
             return vec<3, std::decay_t<decltype(w.x[i])>>{w.x[i], w.y[i], w.z[i]};
