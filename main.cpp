@@ -121,13 +121,15 @@ struct PhongShader final : IShader {
             return normalized((uniform_MIT * direction(Texels(material.normal, uv).normal())).xyz());
         const vec<3, real> n = normalized(to_real(interpolated(varying_nrm, bar)));
         if (material.tangent.empty()) return n;
-        // Darboux frame (i, j, n): i is the direction across n in which u grows, j that in which v grows. A mirrored
-        // texture turns one of them round, so they are found one by one. No frame where uv do not span a plane.
+        // Darboux frame (i, j, n): i is the direction across n in which u grows, at a right angle to the one along the
+        // face in which u stays the same; j that of v. Found one by one, because a mirrored texture turns one of them
+        // round. No frame where uv do not span a plane.
         const vec3 e1 = varying_tri[1] - varying_tri[0], e2 = varying_tri[2] - varying_tri[0];
-        const vec2 d1 = varying_uv[1] - varying_uv[0], d2 = varying_uv[2] - varying_uv[0];
-        const vec<3, real> a = cross(e2, n), b = cross(n, e1);
-        const real side = select(dot(e1, a) < 0, -1, 1);
-        const vec<3, real> i = normalized((a * d1.x + b * d2.x) * side), j = normalized((a * d1.y + b * d2.y) * side);
+        const vec2 du = normalized(vec2{varying_uv[1].x - varying_uv[0].x, varying_uv[2].x - varying_uv[0].x});
+        const vec2 dv = normalized(vec2{varying_uv[1].y - varying_uv[0].y, varying_uv[2].y - varying_uv[0].y});
+        const real side = select(dot(normalized(cross(e1, e2)), n) < 0, -1, 1);  // the normal's side of the face
+        const vec<3, real> i = normalized(cross(normalized(e2 * du.x - e1 * du.y), n)) * side;
+        const vec<3, real> j = normalized(cross(normalized(e2 * dv.x - e1 * dv.y), n)) * side;
         const vec<3, real> t = Texels(material.tangent, uv).normal();
         return normalized(i * t.x + j * t.y + n * t.z);
     }

@@ -108,8 +108,9 @@ struct IShader {
     const Model& model;
     const int begin, end;  // the faces that it draws, of its model
     virtual ~IShader() = default;
-    virtual int vertex_number(int iface, int nthvert) const { return model.corner(iface, nthvert).vert; }
     virtual vec4 vertex(int iface, int nthvert) = 0;  // the corner in clip space; nthvert 0, 1, 2
+    // Corners with the same number are at the same place: vertex() is asked for it once.
+    virtual int vertex_number(int iface, int nthvert) const { return model.corner(iface, nthvert).vert; }
     virtual Color fragment(const Fragment&) const { return {}; }  // not called where depth alone is wanted
 
 protected:
