@@ -93,10 +93,9 @@ Header read_header(const File& file) {
 
     const auto u16 = [b](int i) { return b[i] | b[i + 1] << 8; };
     const Header h{b[0], b[1], b[2], u16(3), u16(5), b[7], u16(12), u16(14), b[16], b[17]};
-    const auto demand = [&](std::initializer_list<int> valid, int value, int byte, const char* what,
-                            const char* names) {
+    const auto demand = [&](std::initializer_list<int> valid, int value, int byte, const char* what, const char* list) {
         if (std::find(valid.begin(), valid.end(), value) == valid.end())
-            file.fail(byte, std::string(what) + " " + std::to_string(value) + " is not " + names);
+            file.fail(byte, std::string(what) + " " + std::to_string(value) + " is not " + list);
     };
     demand({0, 1}, h.map_type, 1, "colour map type", "0 or 1");
     demand({1, 2, 3, 9, 10, 11}, h.type, 2, "image type", "1, 2, 3, 9, 10 or 11");

@@ -1,221 +1,114 @@
-// png.cpp: PNG files (ISO/IEC 15948): chunks and filters. The compression is in deflate.cpp.
+// png.cpp: PNG files: chunks, and compression (RFC 1951) by the fixed codes, which need no tables. Rows are not
+// filtered: under those codes the differences of shades take more bytes than the shades.
 #include "png.h"
 
-#include "deflate.h"
-#include "files.h"
-
 #include <algorithm>
-#include <array>
-#include <cctype>
-#include <cstdlib>
-#include <stdexcept>
+#include <bit>
 
 namespace {
 
 using Byte = std::uint8_t;
 
-constexpr Byte signature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
-enum ColourType { grey = 0, rgb = 2, rgba = 6 };
+struct Bits {
+    Bytes bytes;
+    int count = 0;  // modulo 8 the bits of the last byte
 
-std::uint32_t crc32(const Byte* begin, const Byte* end) {
-    static const std::array<std::uint32_t, 256> table = [] {
-        std::array<std::uint32_t, 256> t{};
-        for (std::uint32_t i = 0; i < 256; i++) {
-            t[i] = i;
-            for (int k = 0; k < 8; k++) t[i] = (t[i] & 1 ? 0xEDB88320 : 0) ^ t[i] >> 1;
+    void put(int value, int n) {  // lowest bit first
+        for (int i = 0; i < n; i++, count++) {
+            if (count % 8 == 0) bytes.push_back(0);
+            bytes.back() = static_cast<Byte>(bytes.back() | (value >> i & 1) << count % 8);
         }
-        return t;
-    }();
-    std::uint32_t crc = 0xFFFFFFFF;
-    for (; begin < end; begin++) crc = table[(crc ^ *begin) & 255] ^ crc >> 8;
-    return ~crc;
-}
-
-// Where a TGAImage has the channel that is PNG's c-th: PNG has red first.
-int channel(int c, int bpp) { return bpp > 1 && c < 3 ? 2 - c : c; }
-
-// What a filter predicts for a byte from its neighbours, which are 0 outside the picture.
-int predict(int filter, int left, int up, int corner) {
-    if (filter == 1) return left;
-    if (filter == 2) return up;
-    if (filter == 3) return (left + up) / 2;
-    if (filter == 4) {  // the neighbour closest to left + up - corner
-        const int from_left = std::abs(up - corner), from_up = std::abs(left - corner);
-        const int from_corner = std::abs(left + up - 2 * corner);
-        if (from_left <= from_up && from_left <= from_corner) return left;
-        return from_up <= from_corner ? up : corner;
     }
-    return 0;
-}
+    void code(int value, int n) {  // highest bit first
+        for (int i = n - 1; i >= 0; i--) put(value >> i, 1);
+    }
+    void symbol(int s) {  // a byte, 256 for the end, or 257 and more for the length of a match
+        if (s < 144) code(0x30 + s, 8);
+        else if (s < 256) code(0x190 + s - 144, 9);
+        else if (s < 280) code(s - 256, 7);
+        else code(0xC0 + s - 280, 8);
+    }
+    // A match of 3 to 257 bytes. Codes of lengths and distances are for ranges that double: a value's leading bits, 3
+    // of a length and 2 of a distance, choose the range, and the bits after them follow as they are.
+    void match(int length, int distance) {
+        const auto after = [](unsigned value, int leading) {
+            return std::max(0, static_cast<int>(std::bit_width(value)) - leading);
+        };
+        const int l = length - 3, l_bits = after(l, 3), d = distance - 1, d_bits = after(d, 2);
+        symbol(257 + 4 * l_bits + (l >> l_bits));
+        put(l, l_bits);
+        code(2 * d_bits + (d >> d_bits), 5);
+        put(d, d_bits);
+    }
+};
 
-// The bytes of the file's y-th row, top row first and red first; a row of zeros stands above the picture.
-Bytes file_row(const TGAImage& picture, int y) {
-    const int bpp = picture.bytespp();
-    Bytes row;
-    for (int x = 0; x < picture.width(); x++)
-        for (int c = 0; c < bpp; c++)
-            row.push_back(y < 0 ? Byte{0} : picture.pixel(x, picture.height() - 1 - y)[channel(c, bpp)]);
-    return row;
-}
-
-// The rows, each behind the number of its filter: the one whose differences, taken as signed, have the least sum of
-// absolute values, as the PNG specification proposes (12.7).
-Bytes filtered(const TGAImage& picture) {
-    const std::size_t bpp = static_cast<std::size_t>(picture.bytespp());
-    Bytes rows, best;
-    for (int y = 0; y < picture.height(); y++) {
-        const Bytes row = file_row(picture, y), above = file_row(picture, y - 1);
-        long least = 0;
-        for (int filter = 0; filter <= 4; filter++) {
-            long sum = 0;
-            Bytes differences{static_cast<Byte>(filter)};
-            for (std::size_t i = 0; i < row.size(); i++) {
-                const int left = i < bpp ? 0 : row[i - bpp], corner = i < bpp ? 0 : above[i - bpp];
-                differences.push_back(static_cast<Byte>(row[i] - predict(filter, left, above[i], corner)));
-                sum += std::min<int>(differences.back(), 256 - differences.back());
-            }
-            if (filter > 0 && sum >= least) continue;
-            least = sum;
-            best = differences;
+// A zlib stream of one block. Of what went before, only the last place where the next three bytes hash alike is tried.
+Bytes deflate(const Bytes& data) {
+    constexpr int farthest = 32768, longest = 257;
+    const int size = static_cast<int>(data.size());
+    std::vector<int> last(1 << 15, -farthest - 1);
+    Bits out{{0x78, 0x01}};
+    out.put(0b011, 3);  // the last block, of fixed codes
+    for (int at = 0, length; at < size; at += std::max(length, 1)) {
+        length = 0;
+        if (at + 3 <= size) {
+            const int before = std::exchange(last[(data[at] << 10 ^ data[at + 1] << 5 ^ data[at + 2]) & 0x7FFF], at);
+            const int most = at - before <= farthest ? std::min(longest, size - at) : 0;
+            while (length < most && data[before + length] == data[at + length]) length++;
+            if (length < 3) length = 0;
+            else out.match(length, at - before);
         }
-        rows.insert(rows.end(), best.begin(), best.end());
+        if (length == 0) out.symbol(data[at]);
     }
-    return rows;
+    out.symbol(256);
+    return out.bytes;
 }
 
-void put_u32(Bytes& out, std::size_t value) {
+void put_u32(Bytes& out, std::uint32_t value) {
     for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<Byte>(value >> shift));
 }
 
-void put_chunk(Bytes& file, const std::string& type, const Bytes& data) {
-    put_u32(file, data.size());
-    const std::size_t begin = file.size();
-    file.insert(file.end(), type.begin(), type.end());
-    file.insert(file.end(), data.begin(), data.end());
-    put_u32(file, crc32(file.data() + begin, file.data() + file.size()));
-}
-
-// A file on its way to a picture; NAME stands for it in messages.
-struct Decoding {
-    Decoding(const Bytes& bytes, const std::string& file_name) : file(bytes), name(file_name) {}
-
-    const Bytes& file;
-    const std::string& name;
-    std::size_t width = 0, height = 0;
-    TGAImage::Format format = TGAImage::GRAYSCALE;
-    Bytes stream;  // the data of all IDAT chunks
-
-    void fail(std::size_t at, const std::string& what) const {
-        throw std::runtime_error(name + ": byte " + std::to_string(at) + ": " + what);
-    }
-    std::size_t u32(std::size_t at) const {
-        std::size_t value = 0;
-        for (std::size_t i = 0; i < 4; i++) value = value << 8 | file[at + i];
-        return value;
-    }
-    void read_header(std::size_t at);
-    void read_chunks();
-    TGAImage unfilter(Bytes rows) const;
-};
-
-void Decoding::read_header(std::size_t at) {
-    const auto side = [&](std::size_t place) {
-        const std::size_t pixels = u32(place);
-        if (pixels < 1 || pixels > 65535) fail(place, "a side of " + std::to_string(pixels) + " pixels");
-        return pixels;
-    };
-    width = side(at);
-    height = side(at + 4);
-    if (file[at + 8] != 8) fail(at + 8, "a depth of " + std::to_string(file[at + 8]) + " bits is not supported");
-    const int colour_type = file[at + 9];
-    if (colour_type == grey) format = TGAImage::GRAYSCALE;
-    else if (colour_type == rgb) format = TGAImage::RGB;
-    else if (colour_type == rgba) format = TGAImage::RGBA;
-    else fail(at + 9, "colour type " + std::to_string(colour_type) + " is not supported");
-    if (file[at + 10] != 0) fail(at + 10, "an unknown compression");
-    if (file[at + 11] != 0) fail(at + 11, "an unknown set of filters");
-    if (file[at + 12] != 0) fail(at + 12, "interlacing is not supported");
-}
-
-void Decoding::read_chunks() {
-    if (file.size() < sizeof signature || !std::equal(std::begin(signature), std::end(signature), file.begin()))
-        fail(0, "this is no PNG file");
-    const auto place = [&](std::size_t at) { return file.begin() + static_cast<std::ptrdiff_t>(at); };
-    std::string type, before;
-    for (std::size_t at = sizeof signature; type != "IEND";) {
-        constexpr std::size_t frame = 12;  // length, type and CRC
-        if (file.size() - at < frame || file.size() - at - frame < u32(at)) fail(file.size(), "a chunk is truncated");
-        const std::size_t begin = at + 8, end = begin + u32(at);  // of the chunk's data
-        before = type;
-        type.assign(place(at + 4), place(begin));
-        if (!std::all_of(place(at + 4), place(begin), [](Byte b) { return std::isalpha(b); }))
-            fail(at + 4, "the type of a chunk is not four letters");
-        const std::uint32_t crc = crc32(file.data() + at + 4, file.data() + end);
-        if (u32(end) != crc) fail(end, "the check sum of " + type + " is wrong");
-        if ((type == "IHDR") != (at == sizeof signature)) fail(at + 4, "IHDR must be the first chunk, and no other");
-        if (type == "IHDR") {
-            if (end - begin != 13) fail(at, "IHDR must have 13 bytes");
-            read_header(begin);
-        } else if (type == "IDAT") {
-            if (!stream.empty() && before != "IDAT") fail(at + 4, "IDAT chunks must follow one another");
-            stream.insert(stream.end(), place(begin), place(end));
-        } else if (type != "IEND" && type != "PLTE" && std::isupper(file[at + 4])) {  // PLTE is only a hint here
-            fail(at + 4, "chunk " + type + " is unknown, but may not be passed over");
-        }
-        at = end + 4;
-        if (type == "IEND" && at < file.size()) fail(at, "bytes after IEND");
-    }
-}
-
-// Undoes the filters, row by row from the top: the rows are replaced by what they stand for.
-TGAImage Decoding::unfilter(Bytes rows) const {
-    TGAImage picture(static_cast<int>(width), static_cast<int>(height), format);
-    const std::size_t bpp = static_cast<std::size_t>(format), row_size = 1 + width * bpp;
-    for (int y = 0; y < picture.height(); y++) {
-        Byte* const row = rows.data() + static_cast<std::size_t>(y) * row_size + 1;
-        const Byte* const above = y == 0 ? nullptr : row - row_size;
-        const int filter = row[-1];
-        if (filter > 4) fail(file.size(), "row " + std::to_string(y) + " has filter " + std::to_string(filter));
-        for (std::size_t i = 0; i + 1 < row_size; i++) {
-            const int left = i < bpp ? 0 : row[i - bpp], up = above ? above[i] : 0;
-            const int corner = i < bpp || !above ? 0 : above[i - bpp];
-            row[i] = static_cast<Byte>(row[i] + predict(filter, left, up, corner));
-        }
-        for (int x = 0; x < picture.width(); x++)
-            for (int c = 0; c < format; c++)
-                picture.pixel(x, picture.height() - 1 - y)[channel(c, format)] = row[x * format + c];
-    }
-    return picture;
+void put_chunk(Bytes& file, const char* type, const Bytes& data) {
+    Bytes body(type, type + 4);
+    body.insert(body.end(), data.begin(), data.end());
+    put_u32(file, static_cast<std::uint32_t>(data.size()));
+    file.insert(file.end(), body.begin(), body.end());
+    put_u32(file, crc32(body));
 }
 
 }  // namespace
 
-TGAImage decode_png(const Bytes& file, const std::string& name) {
-    Decoding decoding(file, name);
-    decoding.read_chunks();
-    const std::size_t size = decoding.height * (1 + decoding.width * static_cast<std::size_t>(decoding.format));
-    return decoding.unfilter(inflate(decoding.stream, size, [&](std::size_t at, const std::string& what) {
-        throw std::runtime_error(name + ": byte " + std::to_string(at) + " of the pixel data: " + what);
-    }));
+std::uint32_t crc32(const Bytes& bytes) {
+    std::uint32_t crc = 0xFFFFFFFF;
+    for (const Byte b : bytes)
+        for (int i = 0; i < 8; i++) crc = crc >> 1 ^ ((crc ^ b >> i) & 1 ? 0xEDB88320 : 0);
+    return ~crc;
 }
 
-Bytes encode_png(const TGAImage& picture) {
-    if (picture.empty()) throw std::invalid_argument("a picture of 0 x 0 pixels cannot be written");
+std::uint32_t adler32(const Bytes& bytes) {
+    std::uint32_t a = 1, b = 0;
+    for (const Byte c : bytes) {
+        a = (a + c) % 65521;
+        b = (b + a) % 65521;
+    }
+    return b << 16 | a;
+}
+
+Bytes png_file(const TGAImage& picture) {
     const int bpp = picture.bytespp();
-    const ColourType colour_type = bpp == TGAImage::GRAYSCALE ? grey : bpp == TGAImage::RGB ? rgb : rgba;
-    Bytes header;
-    put_u32(header, static_cast<std::size_t>(picture.width()));
-    put_u32(header, static_cast<std::size_t>(picture.height()));
-    for (const int b : {8, int{colour_type}, 0, 0, 0}) header.push_back(static_cast<Byte>(b));  // bits; not interlaced
-    Bytes file(std::begin(signature), std::end(signature));
+    Bytes rows, header, file{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+    for (int y = picture.height() - 1; y >= 0; y--) {
+        rows.push_back(0);  // no filter
+        for (int x = 0; x < picture.width(); x++)
+            for (int c = bpp - 1; c >= 0; c--) rows.push_back(picture.pixel(x, y)[c]);  // red first
+    }
+    put_u32(header, picture.width());
+    put_u32(header, picture.height());
+    header.insert(header.end(), {8, bpp == TGAImage::GRAYSCALE ? Byte{0} : Byte{2}, 0, 0, 0});
+    Bytes stream = deflate(rows);
+    put_u32(stream, adler32(rows));
     put_chunk(file, "IHDR", header);
-    put_chunk(file, "IDAT", deflate(filtered(picture)));
+    put_chunk(file, "IDAT", stream);
     put_chunk(file, "IEND", {});
     return file;
-}
-
-TGAImage read_png_file(const std::filesystem::path& path) { return decode_png(read_bytes(path), path.string()); }
-
-void write_png_file(const TGAImage& picture, const std::filesystem::path& path) {
-    write_bytes(path, encode_png(picture));
 }
