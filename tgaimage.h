@@ -65,8 +65,9 @@ private:
 // A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. All its bytes go to
 // a temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of
 // one. Without commit() the temporary file goes with the object. Of several pictures, commit the first when all of them
-// are constructed: where one does not fit on the disk, none is replaced. Throws std::runtime_error "FILE: what", with
-// the temporary file removed.
+// are constructed: where one does not fit on the disk, none is replaced. The file is made in memory: the bytes of the
+// picture at most, one more for each 128 pixels of a row, and 44. Throws std::runtime_error "FILE: what", with the
+// temporary file removed.
 class TGAFile {
 public:
     TGAFile(const TGAImage& image, const std::filesystem::path& path, bool rle = true);
