@@ -559,7 +559,7 @@ constexpr struct {
 
 struct MtlMaterial {
     vec3 Kd{1, 1, 1};
-    std::array<std::string, map_count + 1> maps;  // paths, empty where there is none; bump_map stands in for tangent_map
+    std::array<std::string, map_count + 1> maps;  // paths, or empty; bump_map stands in for tangent_map
     std::vector<std::string> notes;
 };
 using Library = std::map<std::string, MtlMaterial>;

@@ -3,8 +3,8 @@
 #include "files.h"
 #include "tgaimage.h"
 
-// A PNG file (ISO/IEC 15948) of a grey or RGB picture: 8 bits a channel, not interlaced. The same picture gives the same
-// bytes.
+// A PNG file (ISO/IEC 15948) of a grey or RGB picture: 8 bits a channel, not interlaced. The same picture gives the
+// same bytes.
 Bytes png_file(const TGAImage& picture);
 
 // The check sums of a chunk and of the pixel data's zlib stream (RFC 1950).
