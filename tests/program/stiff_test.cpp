@@ -499,10 +499,10 @@ TEST("shadow: a buffer of 1x1, 2x2, 3x3 and 16384x16384") {
 #endif
 }
 
-// The z-buffer, the faces' numbers and the picture are 11 bytes a pixel, 2816 MiB; nothing else grows with the picture.
+// The picture and its file are 3 bytes a pixel each at most, 1548 MiB; nothing else grows with the picture.
 #if !defined(UMBRA_SANITIZED) && defined(__linux__)
 TEST("pictures: 16384x16384 within its memory") {
-    const std::string limit = "ulimit -v " + std::to_string((2816 + 128) * 1024);  // KiB; 128 MiB for all else
+    const std::string limit = "ulimit -v " + std::to_string((1548 + 128) * 1024);  // KiB; 128 MiB for all else
     CHECK(Scene(yard()).good("--threads 2 --size 16384x16384", limit + " && " + umbra).frame.size() > 1000000);
 }
 #endif
