@@ -82,7 +82,7 @@ struct PhongShader final : IShader {
     }
 
     Color fragment(const Fragment& f) const override {
-        const vec<2, coord> uv = interpolated(varying_uv, f.bar);
+        const vec<2, coord> uv = wrapped(interpolated(varying_uv, f.bar));
         const Color texel = material.diffuse.empty() ? Color{255, 255, 255} : Texels(material.diffuse, uv).bgr();
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;

@@ -626,9 +626,9 @@ struct Pass {
         for (int y = std::max(y_begin, face.ymin); y < std::min(y_end, face.ymax + 1); y++) {
             const std::int32_t* const row = nearest + std::ptrdiff_t{stride} * (y - y_begin);
             for (int x = face.xmin; x <= face.xmax; x++) {
-                if (row[x] != mark) continue;
                 xs[n] = x, ys[n] = y;
-                if (++n == most) color();
+                n += row[x] == mark;  // no branch: it would be guessed wrong at both ends of a row
+                if (n == most) color();
             }
         }
         if (n > 0) color();
@@ -658,8 +658,10 @@ struct Pass {
         const Color color = own.fragment(f);
         std::int32_t bgr[3][lanes];
         for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
-        for (int i = 0; i < n; i++)
-            for (int k = 0; k < 3; k++) picture->pixel(xs[i], ys[i])[k] = static_cast<std::uint8_t>(bgr[k][i]);
+        for (int i = 0; i < n; i++) {
+            std::uint8_t* const pixel = picture->pixel(xs[i], ys[i]);
+            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[k][i]);
+        }
     }
 };
 

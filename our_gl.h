@@ -125,13 +125,21 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
         [&](int i) { return varying[0][i] * bar.x + varying[1][i] * bar.y + varying[2][i] * bar.z; });
 }
 
-// The texels (floor(u*w), floor(v*h)) of a picture, one a lane: nearest, wrapped round. [i] is their channel i. uv
-// finite, of any size.
+// Texture coordinates of any size, wrapped round to [0,1]: rounding may give 1 itself. 0 where one is beyond the range of
+// a double.
+INLINED vec<2, coord> wrapped(const vec<2, coord>& uv) {
+    return componentwise<2, coord>([&](int i) {
+        const coord f = uv[i] - floor(uv[i]);
+        return select((f < 0) | !(f == f), coord(0), f);
+    });
+}
+
+// The texels (floor(u*w), floor(v*h)) of a picture, one a lane: the nearest. uv in [0,1]. [i] is their channel i.
 class Texels {
 public:
     INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
         const int w = map.width(), h = map.height();
-        const pack<std::int32_t> x = min(to_int(fraction(uv.x) * w), w - 1), y = min(to_int(fraction(uv.y) * h), h - 1);
+        const pack<std::int32_t> x = min(to_int(uv.x * w), w - 1), y = min(to_int(uv.y * h), h - 1);
         std::int32_t index[lanes];  // modulo 2^32: a picture may have more than 2^31 pixels
         (y * w + x).store(index);
         const std::uint8_t* const first = map.pixel(0, 0);
@@ -151,11 +159,6 @@ public:
     }
 
 private:
-    // Of t, in [0,1]: rounding may give 1 itself. 0 where t is beyond the range of a double.
-    INLINED static coord fraction(const coord& t) {
-        const coord f = t - floor(t);
-        return select((f < 0) | !(f == f), coord(0), f);
-    }
     pack<std::int32_t> bytes_;  // four from the texel on, the first one lowest: up to three may lie beyond the picture
 };
 
