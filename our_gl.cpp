@@ -653,8 +653,8 @@ struct Pass {
         f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
         // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
         for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
-        const coord sum = f.bar.x + f.bar.y + f.bar.z;
-        for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0., f.bar[i] / sum, i == 0);
+        const coord sum = f.bar.x + f.bar.y + f.bar.z, share = 1 / sum;
+        for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0, f.bar[i] * share, i == 0);
         const Color color = own.fragment(f);
         std::int32_t bgr[3][lanes];
         for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
