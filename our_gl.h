@@ -125,8 +125,8 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
         [&](int i) { return varying[0][i] * bar.x + varying[1][i] * bar.y + varying[2][i] * bar.z; });
 }
 
-// Texture coordinates of any size, wrapped round to [0,1]: rounding may give 1 itself. 0 where one is beyond the range of
-// a double.
+// Texture coordinates of any size, wrapped round to [0,1]: rounding may give 1 itself. 0 where one is beyond the range
+// of a double.
 INLINED vec<2, coord> wrapped(const vec<2, coord>& uv) {
     return componentwise<2, coord>([&](int i) {
         const coord f = uv[i] - floor(uv[i]);
