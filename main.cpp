@@ -30,26 +30,26 @@ struct Options {  // the lesson's scene; the command line can change each of the
 // ---- pass 1: what the light sees ----
 
 struct DepthShader final : IShader {  // only the z-buffer is wanted: there is no fragment()
-    mat4 uniform_M;  // Projection*ModelView
+    mat4 uniform_PM;  // Projection*ModelView
 
-    DepthShader(const Model& m, const Camera& camera) : IShader(m, 0, m.nfaces()), uniform_M(camera.to_clip()) {}
+    DepthShader(const Model& m, const Camera& camera) : IShader(m, 0, m.nfaces()), uniform_PM(camera.to_clip()) {}
 
     vec4 vertex(int iface, int nthvert) override {
-        return uniform_M * point(model.vert(iface, nthvert));  // read the vertex of the .obj, take it to clip space
+        return uniform_PM * point(model.vert(iface, nthvert));  // read the vertex of the .obj, take it to clip space
     }
 };
 
-struct Shadow {                // what the first pass leaves for the second
-    mat4 M;                    // Viewport*Projection*ModelView of the light: from object space to its screen
-    DepthBuffer shadowbuffer;  // what is nearest to the light there ...
-    LightGrid grid;            // ... or, for exact shadows, all faces
+struct Shadow {                    // what the first pass leaves for the second
+    mat4 M = mat4::identity();     // Viewport*Projection*ModelView of the light: from object space to its screen
+    DepthBuffer shadowbuffer;      // what is nearest to the light there ...
+    LightGrid grid;                // ... or, for exact shadows, all faces
 };
 
 // ---- pass 2: what the viewer sees ----
 
-// Phong's reflection model with the lesson's weights, in eye coordinates. fragment() is called for a few neighbouring
-// pixels of a face at once: a real is a number for each of them, a mask a yes or no. What a material has no map for is
-// not computed.
+// Phong's reflection model with the lesson's weights, in eye coordinates. What a material has no map for is not
+// computed. fragment() is called for a few neighbouring pixels of a face at once: a coord says where each of them is, a
+// real how bright, a mask yes or no; select() is the ?: of a mask.
 struct PhongShader final : IShader {
     const Options& opt;
     const Shadow& shadow;
@@ -59,7 +59,7 @@ struct PhongShader final : IShader {
     mat4 uniform_MIT;      // ModelView.invert_transpose(), carries normals where ModelView carries points
     mat4 uniform_Mshadow;  // from the viewer's screen to the shadow buffer's
     vec3 uniform_l;        // light vector: towards the light, of length 1
-    vec2 varying_uv[3];    // texture coordinates; this and the others written by vertex(), read by fragment()
+    vec2 varying_uv[3];    // texture coordinates of a triangle: written by vertex(), read by fragment(), as those below
     vec3 varying_nrm[3];   // normals of the vertices
     vec3 varying_tri[3];   // the triangle in eye coordinates
     vec3 varying_sb[3];    // the triangle in the shadow buffer
@@ -112,6 +112,7 @@ struct PhongShader final : IShader {
             return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
         const vec<3, coord> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
         const coord stored = shadow.shadowbuffer.at(sb_p);
+        // With --bias 0 surfaces shadow themselves here and there: z-fighting. The text's cure is --bias 43.34.
         const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, varying_sb);
         return !(stored > sb_p.z + bias);
     }
