@@ -23,7 +23,7 @@
 // says where something is, in doubles; a real says how bright it is, for which floats are enough; a mask is a yes or
 // no. Each lane holds what the number alone would be, bit for bit, so that the count of lanes shows in no picture.
 
-#if !defined(__GNUC__)  // neither gcc nor clang: no vectors that have operators, so one lane
+#if !defined(__GNUC__) || defined(UMBRA_ONE_LANE)  // neither gcc nor clang: no vectors that have operators
 constexpr int lanes = 1;
 #elif defined(__AVX__)
 constexpr int lanes = 8;
@@ -35,7 +35,7 @@ constexpr int lanes = 4;
 
 template <class T, int n>
 struct vector_of {
-#if defined(__GNUC__)
+#if defined(BOTH_HALVES)
     typedef T type __attribute__((vector_size(n * sizeof(T))));
 #else
     typedef T type;
@@ -92,7 +92,7 @@ using coord = pack<double>;
 template <class To, class From>
 INLINED pack<To> converted(const pack<From>& a) {
     pack<To> out;
-#if !defined(__GNUC__)
+#if !defined(BOTH_HALVES)
     out.p[0] = static_cast<To>(a.p[0]);
 #else
     if constexpr (sizeof(To) == sizeof(From)) {

@@ -36,7 +36,8 @@ function(build name compiler level emulator)
   set(builds ${builds} ${name} PARENT_SCOPE)
 endfunction()
 
-# Both compilers optimised, one not at all; the program at hand is the first of them.
+# Both compilers optimised, one not at all; the program at hand is the first of them. It is built for this processor,
+# with as many lanes as that has; aarch64 has four, and one is made to have a single lane, as other compilers have.
 set(builds umbra)
 set(run_umbra ${UMBRA})
 if(NOT UMBRA_BY STREQUAL GNU)
@@ -47,7 +48,7 @@ if(NOT UMBRA_BY STREQUAL Clang)
 endif()
 set(static -DCMAKE_EXE_LINKER_FLAGS=-static)
 build(aarch64 aarch64-linux-gnu-g++ -O1 "qemu-aarch64;qemu-aarch64-static" -DCMAKE_SYSTEM_NAME=Linux ${static})
-build(windows x86_64-w64-mingw32-g++-posix -O0 "wine;wine64" -DCMAKE_SYSTEM_NAME=Windows ${static})
+build(windows x86_64-w64-mingw32-g++-posix "-O0 -DUMBRA_ONE_LANE" "wine;wine64" -DCMAKE_SYSTEM_NAME=Windows ${static})
 
 # Every build draws the scene; the first one on a single thread. What it says goes to a file, not to a pipe: the
 # services that wine starts would hold that open for seconds.
