@@ -109,6 +109,18 @@ void check_invariants(const Model& m) {
 const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 const std::string extras = "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nvn 0 1 0\nvn 1 0 0\n";
 
+struct Case {
+    std::string obj, expected;
+};
+// Each is an .obj and its faces.
+void check_faces(const std::vector<Case>& cases) {
+    for (const Case& c : cases) CHECK_EQ(faces(c.obj), c.expected);
+}
+// Each is an .obj and what is said of its first error.
+void check_errors(const std::vector<Case>& cases) {
+    for (const Case& c : cases) CHECK_THROWS(load(c.obj), ("model.obj:" + c.expected).c_str());
+}
+
 }  // namespace
 
 // ---- corners ----
@@ -132,50 +144,47 @@ TEST("a corner may be v, v/vt, v//vn or v/vt/vn, each by itself") {
     CHECK(mixed.uv(0, 0) == vec2{});
 }
 
-TEST("negative indices count back from what is defined so far") {
-    CHECK_EQ(faces(square + "f -4 -3 -2\nv 2 2 2\nf -1 -2 -5\n"), "0 1 2, 4 3 0");
-    CHECK_EQ(faces(square + extras + "f -4/-1/-1 2/-3 -2\n"), "0/2 1/0 2");
-}
-
-TEST("positive indices may look ahead") {
-    CHECK_EQ(faces("f 1/1 2/2 3/1\n" + square + extras), "0/0 1/1 2/0");
-    CHECK_EQ(normals(load("f 1//1 2//1 3//1\n" + square + extras), 0), "0 0 1, 0 0 1, 0 0 1");
+TEST("indices may count back from what is defined so far, or look ahead") {
+    check_faces({{square + "f -4 -3 -2\nv 2 2 2\nf -1 -2 -5\n", "0 1 2, 4 3 0"},
+                 {square + extras + "f -4/-1/-1 2/-3 -2\n", "0/2 1/0 2"},
+                 {"f 1/1 2/2 3/1\n" + square + extras, "0/0 1/1 2/0"}});
+    CHECK_EQ(normals(load("f 1//1 2//2 3//3\n" + square + extras), 0), "0 0 1, 0 1 0, 1 0 0");
 }
 
 TEST("quads and polygons become triangles that wind alike") {
-    CHECK_EQ(faces(square + "f 1 2 3 4\n"), "0 1 2, 0 2 3");
-    CHECK_EQ(faces(square + "f 4 3 2 1\n"), "3 2 1, 3 1 0");
-    CHECK_EQ(faces(square + "v .5 1.5 0\nf 1 2 3 5 4\n"), "0 1 2, 0 2 4, 0 4 3");
-    CHECK_EQ(faces(square + extras + "f 1/1 2/2 3/3 4/2\n"), "0/0 1/1 2/2, 0/0 2/2 3/1");
+    check_faces({{square + "f 1 2 3 4\n", "0 1 2, 0 2 3"},
+                 {square + "f 4 3 2 1\n", "3 2 1, 3 1 0"},
+                 {square + "v .5 1.5 0\nf 1 2 3 5 4\n", "0 1 2, 0 2 4, 0 4 3"},
+                 {square + extras + "f 1/1 2/2 3/3 4/2\n", "0/0 1/1 2/2, 0/0 2/2 3/1"}});
 }
 
 // ---- lines ----
 
-TEST("lines may end in CRLF") {
-    CHECK_EQ(faces("v 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nvt 0 0\r\nf 1/1 2/1 \\\r\n3/1\r\n"), "0/0 1/0 2/0");
-    CHECK_THROWS(load("v 0 0 0\r\n\r\nf 1 1 2\r\n"), "model.obj:3:");
-}
-
-TEST("tabs and leading blanks do not matter") {
-    CHECK_EQ(faces("\tv\t0 0\t\t0\n  v 1  0 0 \n \t v 1 1 0\t\n   f  1\t2   3  \n"), "0 1 2");
-}
-
-TEST("comments may stand anywhere, and do not continue") {
-    const Model m = load("# a head\nv 0 0 0 # origin\nv 1 0 0#near\n  # \\\nv 1 1 0\nf 1 2 3 # a face \\\nf 3 2 1#\n#");
-    CHECK_EQ(m.nverts(), 3);
-    CHECK_EQ(faces(m), "0 1 2, 2 1 0");
-}
-
-TEST("a backslash at the end continues a line, and lines are still counted right") {
-    CHECK_EQ(faces("v 0 \\\n0 0\nv\\\n1 0 0\nv 1 1\\\n 0\nf 1 \\\n\\\n 2\\  \n 3\n"), "0 1 2");
-    CHECK_EQ(faces("o one \\\nf 1 1 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\\"), "0 1 2");
-    CHECK_EQ(faces(square + "f 1 2 3 \\"), "0 1 2");
-    CHECK_EQ(faces(square + "f 1 2 3 \\\n\\\n"), "0 1 2");
-    CHECK_THROWS(load("v 0 0 \\\n 0\nv 1 0 0\nv x 1 1\n"), "model.obj:4: 'x' is no number");
-    CHECK_THROWS(load("v 0 0 \\\n 0\nv 1 \\\n y 0\n"), "model.obj:4: 'y' is no number");
-    CHECK_THROWS(load("o a \\\n b \\\n c\nf 1 2 0\n"), "model.obj:4: vertex index 0");
-    CHECK_THROWS(load(square + "f 1 \\\n 2\n"), "model.obj:5: a face needs three corners, this one has 2");
-    CHECK_THROWS(load(square + "f 1 \\2 3\n"), "model.obj:5:");
+TEST("line ends, tabs, blanks, comments and continued lines; the last line needs no newline") {
+    check_faces({
+        {"v 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nvt 0 0\r\nf 1/1 2/1 \\\r\n3/1\r\n", "0/0 1/0 2/0"},
+        {"\tv\t0 0\t\t0\n  v 1  0 0 \n \t v 1 1 0\t\n   f  1\t2   3  \n", "0 1 2"},
+        {"# a head\nv 0 0 0 # origin\nv 1 0 0#near\n  # \\\nv 1 1 0\nf 1 2 3 # a face \\\nf 3 2 1#\n#", "0 1 2, 2 1 0"},
+        {"v 0 \\\n0 0\nv\\\n1 0 0\nv 1 1\\\n 0\nf 1 \\\n\\\n 2\\  \n 3\n", "0 1 2"},
+        {"o one \\\nf 1 1 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\\", "0 1 2"},
+        {square + "f 1 2 3 \\", "0 1 2"},
+        {square + "f 1 2 3 \\\n\\\n", "0 1 2"},
+        {square + "f 1 2 3", "0 1 2"},
+        {square + "f 1 2 3\r", "0 1 2"},
+        {"\n\n\r\n \t\n" + square + "\n\n\nf 1 2 3\n\n", "0 1 2"},
+    });
+    check_errors({{"v 0 0 0\r\n\r\nf 1 1 2\r\n", "3:"},
+                  {"v 0 0 \\\n 0\nv 1 0 0\nv x 1 1\n", "4: 'x' is no finite number"},
+                  {"v 0 0 \\\n 0\nv 1 \\\n y 0\n", "4: 'y' is no finite number"},
+                  {"o a \\\n b \\\n c\nf 1 2 0\n", "4: vertex index 0"},
+                  {square + "f 1 \\\n 2\n", "6: a face needs three corners, this one has 2"},
+                  {square + "f 1 \\2 3\n", "5:"}});
+    CHECK_EQ(load("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 1 1 .5").verts()[2].z, .5);
+    for (int size = 4093; size <= 4100; size++) {  // around a page's end: a mapped file may fill its pages
+        std::string obj = square + "f 1 2 3\n#";
+        obj += std::string(size - obj.size() - 8, '-') + "\nf 2 3 4";
+        check_faces({{obj, "0 1 2, 1 2 3"}, {obj + "\n", "0 1 2, 1 2 3"}, {obj + "\\", "0 1 2, 1 2 3"}});
+    }
 }
 
 TEST("lines of a megabyte") {
@@ -194,7 +203,7 @@ TEST("lines of a megabyte") {
     CHECK_THROWS(load(continued + "x"), "model.obj:400005: 'x' is no vertex index");
 }
 
-TEST("lines of all lengths, over many reads of the file") {
+TEST("lines of all lengths") {
     std::mt19937 random(1);
     std::string obj;
     const int n = 40000;
@@ -207,30 +216,15 @@ TEST("lines of all lengths, over many reads of the file") {
     const auto lines = std::count(obj.begin(), obj.end(), '\n');
     const Model m = load(obj + "f 1 2 3");
     bool right = m.nverts() == n;
-    for (int i = 0; right && i < n; i++) right = m.verts()[static_cast<std::size_t>(i)] == vec3{i * 1., i + 1., 0};
+    for (int i = 0; right && i < n; i++) right = m.verts()[i] == vec3{i * 1., i + 1., 0};
     CHECK(right);
-    CHECK(obj.size() > 5u << 18);  // five reads at least
     const std::string where = "model.obj:" + std::to_string(lines + 1) + ": vertex index 0";
     CHECK_THROWS(load(obj + "f 1 2 0"), where.c_str());
 }
 
-TEST("the last line needs no newline") {
-    CHECK_EQ(faces(square + "f 1 2 3"), "0 1 2");
-    CHECK_EQ(load("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 1 1 .5").verts()[2].z, .5);
-    CHECK_EQ(faces(square + "f 1 2 3\r"), "0 1 2");
-    // Ends at, and around, a boundary of what is read at once.
-    for (int more = -3; more <= 3; more++) {
-        std::string obj = square + "f 1 2 3\n#";
-        obj += std::string(static_cast<std::size_t>((1 << 18) + more) - obj.size() - 8, '-') + "\nf 2 3 4";
-        CHECK_EQ(faces(obj), "0 1 2, 1 2 3");
-    }
-}
-
-TEST("a byte order mark and empty lines are skipped") {
+TEST("a byte order mark is skipped") {
     CHECK_EQ(load("\xEF\xBB\xBFv 5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").verts()[0].x, 5);
-    CHECK_EQ(faces("\n\n\r\n \t\n" + square + "\n\n\nf 1 2 3\n\n"), "0 1 2");
     CHECK_THROWS(load("\xEF\xBB\xBF\n\nf 0 1 1"), "model.obj:3:");
-    CHECK_EQ(load("\xEF\xBB\xBFv " + std::string(1000000, ' ') + "5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").verts()[0].x, 5);
 }
 
 TEST("o, g, s, lines, curves and unknown words are passed over") {
@@ -243,42 +237,13 @@ TEST("o, g, s, lines, curves and unknown words are passed over") {
 // ---- numbers ----
 
 TEST("numbers are read as strtod reads them, to the last bit") {
-    std::vector<std::string> numbers = {"0",
-                                        "-0",
-                                        "+1",
-                                        ".5",
-                                        "-.5",
-                                        "+.5",
-                                        "5.",
-                                        "1e3",
-                                        "1E3",
-                                        "1e+3",
-                                        "1.5e-3",
-                                        "-2.5E-10",
-                                        "00012.50",
-                                        "999999999999999",
-                                        "9999999999999999",
-                                        "0.1",
-                                        "123456789.123456",
-                                        "1.23456789012345",
-                                        "0.000000000000001",
-                                        "9007199254740993",
-                                        "2.2250738585072014e-308",
-                                        "5e-324",
-                                        "1e-310",
-                                        "1.7976931348623157e308",
-                                        "0.30000000000000004",
-                                        "179769313486231570000000000000e279",
-                                        "100000000000000000000000000000000000000",
-                                        "0.00000000000000000000000000000000001",
-                                        "1e-400",
-                                        "-1e-400",
-                                        "0e999",
-                                        "0.0e-999",
-                                        "1e-99999999999999999999",
-                                        "1" + std::string(400, '0') + "e-400",
-                                        "0." + std::string(400, '0') + "1",
-                                        "0." + std::string(400, '0') + "1e402"};
+    std::vector<std::string> numbers = {
+        "0", "-0", "+1", ".5", "-.5", "+.5", "5.", "1e3", "1E3", "1e+3", "1.5e-3", "-2.5E-10", "00012.50", "999999999999999",
+        "9999999999999999", "0.1", "123456789.123456", "1.23456789012345", "0.000000000000001", "9007199254740993",
+        "2.2250738585072014e-308", "5e-324", "1e-310", "1.7976931348623157e308", "0.30000000000000004",
+        "179769313486231570000000000000e279", "100000000000000000000000000000000000000",
+        "0.00000000000000000000000000000000001", "1e-400", "-1e-400", "0e999", "0.0e-999", "1e-99999999999999999999",
+        "1" + std::string(400, '0') + "e-400", "0." + std::string(400, '0') + "1", "0." + std::string(400, '0') + "1e402"};
     std::mt19937 random(2);
     for (int i = 0; i < 20000; i++) {
         std::string s = random() % 3 == 0 ? "-" : "";
@@ -309,69 +274,57 @@ TEST("a weight or colours after the coordinates are passed over") {
     CHECK_EQ(text(m.normal(0, 0)), "0 0 1");
 }
 
-TEST("what is no finite number is an error with its line") {
-    for (const char* bad : {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309",
-                            "1e99999999999999999999", "nan(7)", "179769313486231570000000000000e280"}) {
-        const std::string where = "model.obj:2: '" + std::string(bad) + "' is not finite";
-        CHECK_THROWS(load("\nv 0 " + std::string(bad) + " 0\n"), where.c_str());
-        CHECK_THROWS(load("\nvt " + std::string(bad) + " 0\n"), where.c_str());
-        CHECK_THROWS(load("\nvn 0 0 " + std::string(bad) + "\n"), where.c_str());
-        CHECK_THROWS(load("\nv 0 0 0 " + std::string(bad) + "\n"), where.c_str());
-    }
+TEST("what is no finite number or no index is an error with its line") {
     const std::string long_number = "1" + std::string(400, '0');
-    CHECK_THROWS(load("v " + long_number + " 0 0\n"), "model.obj:1: '1000000000");
-    CHECK_THROWS(load("v " + long_number + " 0 0\n"), "...' is not finite");
+    for (const std::string bad :
+         {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309", "1e99999999999999999999", "nan(7)",
+          "179769313486231570000000000000e280", "1x", "1.2.3", "1e", "1e+", "1-2", "0x10", "1,5", "1_0", "1/2", "1\\2", "x",
+          ".", "-", "+", "+-1", "-+1", "--1", "e5", ",5", "one", "\\1", "/"})
+        check_errors({{"\nv 0 " + bad + " 0\n", "2: '" + bad + "' is no finite number"},
+                      {"\nvt " + bad + " 0\n", "2: '" + bad + "' is no finite number"},
+                      {"\nvn 0 0 " + bad + "\n", "2: '" + bad + "' is no finite number"},
+                      {"\nv 0 0 0 " + bad + "\n", "2: '" + bad + "' is no finite number"}});
+    check_errors({{"v " + long_number + " 0 0\n", "1: '1" + std::string(59, '0') + "...' is no finite number"},
+                  {"v 0 0 1\x02\n", "1: '1?' is no finite number"},
+                  {"v 0 0 \x1B[2J\n", "1: '?[2J' is no finite number"}});  // nothing of it can steer a terminal
+    for (const std::string bad : {"1x", "1/1x", "1//1x", "1/1/1/1", "1.0", "1/1/1x", "1e0"})
+        check_errors({{square + extras + "f 1 2 " + bad + "\n", "11: garbage after a number: '"}});
+    for (const std::string bad : {"x", "/1", "//1", "-", "+", "--1", "nan", "2147483648", "4294967297", "-2147483648",
+                                  "99999999999999999999999999", "18446744073709551617"})
+        check_errors({{square + extras + "f 1 2 " + bad + "\n", "11: '" + bad + "' is no vertex index"}});
+    check_errors({{square + extras + "f 1 2/x 3\n", "11: 'x' is no texture index"},
+                  {square + extras + "f 1 2/- 3\n", "11: '-' is no texture index"},
+                  {square + extras + "f 1 2//x 3\n", "11: 'x' is no normal index"}});
 }
 
-TEST("garbage after or instead of a number is an error with its line") {
-    for (const char* bad : {"1x", "1.2.3", "1e", "1e+", "1-2", "0x10", "1,5", "1_0", "1/2", "1\\2", "1\x02"})
-        CHECK_THROWS(load(square + "v 0 0 " + bad + "\n"), "model.obj:5: garbage after a number: '");
-    for (const char* bad : {"x", ".", "-", "+", "+-1", "-+1", "--1", "e5", ",5", "one", "\\1", "/"})
-        CHECK_THROWS(load(square + "v 0 0 " + bad + "\n"), "is no number");
-    for (const char* bad : {"1x", "1/1x", "1//1x", "1/1/1/1", "1.0", "1/1/1x", "1e0"})
-        CHECK_THROWS(load(square + extras + "f 1 2 " + bad + "\n"), "model.obj:11: garbage after a number: '");
-    for (const char* bad : {"x", "/1", "//1", "-", "+", "--1", "nan"})
-        CHECK_THROWS(load(square + extras + "f 1 2 " + bad + "\n"), "is no vertex index");
-    CHECK_THROWS(load(square + extras + "f 1 2/x 3\n"), "model.obj:11: garbage after a number: 'x'");
-    CHECK_THROWS(load(square + extras + "f 1 2/- 3\n"), "is no texture index");
-    CHECK_THROWS(load("v 0 0 \x1B[2J\n"), "'?[2J' is no number");  // nothing of the file can steer a terminal
-}
-
-TEST("too few numbers or corners are an error with its line") {
-    CHECK_THROWS(load("v 1 2\n"), "model.obj:1: a vertex needs three coordinates");
-    CHECK_THROWS(load("\nv\n"), "model.obj:2: a vertex needs three coordinates");
-    CHECK_THROWS(load("v 1 2 #3\n"), "model.obj:1: a vertex needs three coordinates");
-    CHECK_THROWS(load("vn 1 2\n"), "model.obj:1: a normal needs three coordinates");
-    CHECK_THROWS(load("vt\n"), "model.obj:1: a texture coordinate needs a number");
-    CHECK_THROWS(load(square + "f\n"), "model.obj:5: a face needs three corners, this one has 0");
-    CHECK_THROWS(load(square + "f 1 2\n"), "model.obj:5: a face needs three corners, this one has 2");
-    CHECK_THROWS(load(square + "f 1 2 # 3\n"), "model.obj:5: a face needs three corners, this one has 2");
-}
-
-TEST("an index of zero or out of range is an error with its line") {
-    CHECK_THROWS(load(square + "f 1 2 0\n"), "model.obj:5: vertex index 0 (indices count from 1)");
-    CHECK_THROWS(load(square + extras + "f 1 2 3/0\n"), "model.obj:11: texture index 0 (indices count from 1)");
-    CHECK_THROWS(load(square + extras + "f 1 2 3//-0\n"), "model.obj:11: normal index 0 (indices count from 1)");
-    CHECK_THROWS(load(square + "f 1 2 5\n\nf 1 2 3\n"), "model.obj:5: vertex index 5, but the file has only 4");
-    CHECK_THROWS(load(square + "f 1 2 3\nf 1/1 2 3\n"), "model.obj:6: texture index 1, but the file has only 0");
-    CHECK_THROWS(load(square + extras + "f 1//4 2 3\n"), "model.obj:11: normal index 4, but the file has only 3");
-    CHECK_THROWS(load("f 1 2 3\n\nf 1 2 5\nf 9 9 9\n" + square),
-                 "model.obj:3: vertex index 5, but the file has only 4");
-    CHECK_THROWS(load(square + "f 1 2 -5\nv 0 0 0\n"), "model.obj:5: vertex index -5, but only 4 are defined so far");
-    CHECK_THROWS(load(square + "f 1/-1 2 3\n"), "model.obj:5: texture index -1, but only 0 are defined so far");
-    for (const char* huge :
-         {"2147483648", "4294967297", "99999999999999999999999999", "-2147483648", "18446744073709551617"})
-        CHECK_THROWS(load(square + "f 1 2 " + huge + "\n"), "model.obj:5: vertex index '");
-    CHECK_THROWS(load(square + "f 1 2 2147483647\n"), "model.obj:5: vertex index 2147483647, but the file has only 4");
+TEST("too few numbers or corners, an index of zero or out of range are errors with their line") {
+    check_errors({
+        {"v 1 2\n", "1: a vertex needs three coordinates"},
+        {"\nv\n", "2: a vertex needs three coordinates"},
+        {"v 1 2 #3\n", "1: a vertex needs three coordinates"},
+        {"vn 1 2\n", "1: a normal needs three coordinates"},
+        {"vt\n", "1: a texture coordinate needs a number"},
+        {square + "f\n", "5: a face needs three corners, this one has 0"},
+        {square + "f 1 2\n", "5: a face needs three corners, this one has 2"},
+        {square + "f 1 2 # 3\n", "5: a face needs three corners, this one has 2"},
+        {square + "f 1 2 0\n", "5: vertex index 0 (indices count from 1)"},
+        {square + extras + "f 1 2 3/0\n", "11: texture index 0 (indices count from 1)"},
+        {square + extras + "f 1 2 3//-0\n", "11: normal index 0 (indices count from 1)"},
+        {square + "f 1 2 5\n\nf 1 2 3\n", "5: vertex index 5, but the file has only 4"},
+        {square + "f 1 2 3\nf 1/1 2 3\n", "6: texture index 1, but the file has only 0"},
+        {square + extras + "f 1//4 2 3\n", "11: normal index 4, but the file has only 3"},
+        {"f 1 2 3\n\nf 1 2 5\nf 9 9 9\n" + square, "3: vertex index 5, but the file has only 4"},
+        {square + "f 1 2 -5\nv 0 0 0\n", "5: vertex index -5, but only 4 are defined so far"},
+        {square + "f 1/-1 2 3\n", "5: texture index -1, but only 0 are defined so far"},
+        {square + "f 1 2 2147483647\n", "5: vertex index 2147483647, but the file has only 4"},
+    });
 }
 
 // ---- files as a whole ----
 
 TEST("a file without a face is an error") {
-    CHECK_THROWS(load(""), "model.obj: no faces");
-    CHECK_THROWS(load(square), "model.obj: no faces");
-    CHECK_THROWS(load("\\"), "model.obj: no faces");
-    CHECK_THROWS(load("this is a letter,\nand no model.\n"), "model.obj: no faces");
+    for (const std::string& obj : {std::string(), square, std::string("\\"), std::string("a letter,\nno model.\n")})
+        CHECK_THROWS(load(obj), "model.obj: no faces");
 }
 
 TEST("a missing file, a folder and a binary file are errors") {
@@ -409,6 +362,8 @@ namespace {
 
 using Polygon = std::vector<vec2>;
 
+double below(std::mt19937& random, int n) { return static_cast<double>(random() % n); }  // a whole number in [0,n)
+
 double area2(const vec2& a, const vec2& b, const vec2& c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
@@ -442,7 +397,7 @@ Cut cut(const Polygon& p, const Model& m) {
     result.faces = m.nfaces();
     for (int f = 0; f < m.nfaces(); f++) {
         vec2 t[3];
-        for (int c = 0; c < 3; c++) t[c] = p[static_cast<std::size_t>(m.corner(f, c).vert)];
+        for (int c = 0; c < 3; c++) t[c] = p[m.corner(f, c).vert];
         const double a = area2(t[0], t[1], t[2]);
         result.area2 += a;
         result.empty += a == 0;
@@ -496,15 +451,13 @@ bool is_simple(const Polygon& p) {
 Polygon random_polygon(std::mt19937& random, int n, int grid) {
     Polygon p;
     for (int i = 0; i < n; i++)
-        p.push_back({static_cast<double>(random() % static_cast<unsigned>(grid)),
-                     static_cast<double>(random() % static_cast<unsigned>(grid))});
+        p.push_back({below(random, grid), below(random, grid)});
     for (int round = 0; round < 200; round++) {
         bool crossing = false;
         for (std::size_t i = 0; i + 2 < p.size(); i++)
             for (std::size_t j = i + 2; j < p.size(); j++)
                 if (!(i == 0 && j + 1 == p.size()) && touch(p[i], p[i + 1], p[j], p[(j + 1) % p.size()])) {
-                    std::reverse(p.begin() + static_cast<std::ptrdiff_t>(i) + 1,
-                                 p.begin() + static_cast<std::ptrdiff_t>(j) + 1);
+                    std::reverse(p.begin() + i + 1, p.begin() + j + 1);
                     crossing = true;
                 }
         if (!crossing) break;
@@ -516,15 +469,14 @@ Polygon random_polygon(std::mt19937& random, int n, int grid) {
 
 TEST("concave polygons are covered exactly once, in any plane, from any first corner") {
     const Polygon shapes[] = {
-        {{0, 0}, {4, 0}, {1, 1}, {0, 4}},                                                                      // a dart
-        {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}},                                                      // an L
-        {{0, 0}, {9, 0}, {9, 9}, {6, 9}, {6, 3}, {3, 3}, {3, 9}, {0, 9}},                                      // a U
-        {{0, 0}, {2, 8}, {4, 1}, {6, 8}, {8, 1}, {10, 8}, {12, 0}, {12, -1}, {0, -1}},                         // a comb
-        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}},  // a
-                                                                                                               // spiral
-        {{0, 3}, {2, 2}, {3, 0}, {4, 2}, {6, 3}, {4, 4}, {3, 6}, {2, 4}},                                      // a star
+        {{0, 0}, {4, 0}, {1, 1}, {0, 4}},  // a dart
+        {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}},  // an L
+        {{0, 0}, {9, 0}, {9, 9}, {6, 9}, {6, 3}, {3, 3}, {3, 9}, {0, 9}},  // a U
+        {{0, 0}, {2, 8}, {4, 1}, {6, 8}, {8, 1}, {10, 8}, {12, 0}, {12, -1}, {0, -1}},  // a comb
+        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}},  // a spiral
+        {{0, 3}, {2, 2}, {3, 0}, {4, 2}, {6, 3}, {4, 4}, {3, 6}, {2, 4}},  // a star
         {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},  // a square, its sides halved
-        {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3}},                          // a triangle with five corners
+        {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3}},  // a triangle with five corners
     };
     for (Polygon p : shapes) {
         CHECK(is_simple(p));
@@ -556,23 +508,8 @@ TEST("random simple polygons are covered exactly once") {
 TEST("a hole that a bridge joins to the outline, spikes and repeated corners") {
     // The bridge from (0,0) to (3,3) is walked twice.
     check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}}, true);
-    check_cut({{0, 0},
-               {9, 0},
-               {9, 9},
-               {0, 9},
-               {0, 0},
-               {1, 1},
-               {1, 2},
-               {2, 2},
-               {5, 5},
-               {5, 7},
-               {7, 7},
-               {7, 5},
-               {5, 5},
-               {2, 2},
-               {2, 1},
-               {1, 1}},
-              true);
+    check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {5, 5}, {5, 7}, {7, 7}, {7, 5}, {5, 5}, {2, 2},
+               {2, 1}, {1, 1}}, true);
     check_cut({{0, 0}, {4, 0}, {4, 4}, {7, 9}, {4, 4}, {0, 4}}, true);  // outward
     check_cut({{0, 0}, {4, 0}, {4, 4}, {2, 1}, {4, 4}, {0, 4}}, true);  // inward
     check_cut({{0, 0}, {4, 0}, {8, 0}, {4, 0}, {4, 4}, {0, 4}}, true);  // along an edge
@@ -599,7 +536,7 @@ TEST("a square with a cut along a random tree, walked around on both sides") {
         int x = 0, y = 0;
         unsigned back = 2;  // from the corner, that is between -x and -y
         for (std::size_t steps = 0;; steps++) {
-            p.push_back({static_cast<double>(x), static_cast<double>(y)});
+            p.push_back({1. * x, 1. * y});
             if (steps == 2 * (nodes.size() - 1)) break;
             unsigned d = (back + (steps ? 1u : 0u)) % 4;
             while (!edge[x][y][d]) d = (d + 1) % 4;
@@ -608,7 +545,7 @@ TEST("a square with a cut along a random tree, walked around on both sides") {
             back = (d + 2) % 4;
         }
         CHECK(x == 0 && y == 0);
-        std::rotate(p.begin(), p.begin() + static_cast<std::ptrdiff_t>(random() % p.size()), p.end());
+        std::rotate(p.begin(), p.begin() + random() % p.size(), p.end());
         const Cut result = cut(p, load(in_plane(p, {2, 1, 0}, {-1, 3, 1})));
         CHECK_EQ(result.faces, static_cast<int>(p.size()) - 2);
         CHECK_EQ(result.area2, 2. * (n + 1) * (n + 1));
@@ -628,14 +565,14 @@ TEST("polygons without area, or that cross themselves, have two triangles fewer 
     for (int i = 0; i < 500; i++) {
         Polygon p;
         for (auto n = 4 + random() % 30; n-- > 0;)
-            p.push_back({static_cast<double>(random() % 6), static_cast<double>(random() % 6)});
+            p.push_back({below(random, 6), below(random, 6)});
         const Model m = load(in_plane(p));
         CHECK_EQ(m.nfaces(), static_cast<int>(p.size()) - 2);
         CHECK_EQ(cut(p, m).area2, area2(p));
     }
     Polygon star;  // of 100 points, twice around
     for (int i = 0; i < 100; i++) star.push_back({std::cos(i * .13), std::sin(i * .13)});
-    CHECK_EQ(notes(load(in_plane(star))), "1 polygon crosses itself or cannot be cut well\n");
+    CHECK_EQ(notes(load(in_plane(star))), "polygons that cross themselves or have too many corners: 1\n");
 }
 
 TEST("a polygon is cut alike at every scale, to the ends of the double's range") {
@@ -657,17 +594,32 @@ TEST("a polygon is cut alike at every scale, to the ends of the double's range")
     CHECK_EQ(faces(far), faces(in_plane(p)));
 }
 
-// From 1000 corners on a polygon stays a fan, which is said: so the time is bounded whatever the file.
-TEST("polygons of many corners") {
-    for (const int n : {500, 1000, 50000}) {
-        Polygon comb;
-        for (int i = 0; i < n / 2 - 2; i++) comb.insert(comb.end(), {{2. * i, 0}, {2. * i + 1, 1000}});
-        comb.insert(comb.end(), {{n - 4., 0}, {n - 4., -1}, {0, -1}});
-        const Model m = load(in_plane(comb));
-        const Cut of_comb = cut(comb, m);
-        CHECK_EQ(of_comb.faces, n - 3);
-        CHECK_EQ(of_comb.reversed > 0, n > 1000);
-        CHECK_EQ(notes(m), n > 1000 ? "1 polygon crosses itself or cannot be cut well\n" : "");
+TEST("polygons of very many corners: concave ones are cut up to a thousand, convex ones always") {
+    const auto comb = [](int n) {
+        Polygon p;
+        for (int i = 0; i < n / 2; i++) p.insert(p.end(), {{2. * i, 0}, {2. * i + 1, 1000}});
+        p.back() = {1. * n, -1};
+        p.push_back({0, -1});
+        return p;
+    };
+    check_cut(comb(999));
+    Polygon spiral, bow;
+    for (int i = 0; i < 1000; i++) {
+        const double angle = (i < 500 ? i : 999 - i) * .1, r = 1 + angle + (i < 500 ? 0 : 2);
+        spiral.push_back({r * std::cos(angle), r * std::sin(angle)});
+    }
+    const Cut of_spiral = cut(spiral, load(in_plane(spiral)));
+    CHECK_EQ(of_spiral.faces, 998);
+    CHECK_EQ(of_spiral.reversed, 0);
+    const int n = 100000;
+    for (int i = 0; i < n; i++) bow.push_back({1. * i, 1e-5 * i * i});
+    const Model convex = load(in_plane(bow));
+    CHECK_EQ(cut(bow, convex).reversed, 0);
+    CHECK_EQ(notes(convex), "");
+    for (const int corners : {1001, n + 1}) {  // a fan, that covers more than the polygon
+        const Model m = load(in_plane(comb(corners - 1)));
+        CHECK_EQ(m.nfaces(), corners - 2);
+        CHECK_EQ(notes(m), "polygons that cross themselves or have too many corners: 1\n");
     }
 }
 
@@ -933,12 +885,10 @@ TEST("the maps of an .mtl, relative to it, before those by suffix") {
     const Folder folder;
     fs::create_directory(folder / "lib");
     fs::create_directory(folder / "lib/my maps");
-    for (const char* name : {"lib/my maps/a b.tga", "lib/s.TGA", "lib/n.tga", "lib/e.tga", "lib/bump.tga"})
-        folder.picture(name, name[4] == 'm'   ? 100
-                             : name[4] == 's' ? 110
-                             : name[4] == 'n' ? 120
-                             : name[4] == 'e' ? 130
-                                              : 140);
+    for (const auto& [name, first_channel] : {std::pair("lib/my maps/a b.tga", 100), std::pair("lib/s.TGA", 110),
+                                              std::pair("lib/n.tga", 120), std::pair("lib/e.tga", 130),
+                                              std::pair("lib/bump.tga", 140)})
+        folder.picture(name, first_channel);
     folder.write("lib/m.mtl",
                  "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ks s.TGA\nnorm -bm 0.5 n.tga\n"
                  "map_Bump -bm 1 bump.tga\nmap_Ke -mm 0 1 -blendu off -type sphere -imfchan l e.tga \r\n"
@@ -969,25 +919,25 @@ TEST("a map that is no .tga, or is missing, is a note; one that is corrupt is an
     const Model m(folder / "m.obj");
     CHECK_EQ(maps(m), "-1 -1 -1 -1 -1, -1 -1 -1 -1 -1");
     CHECK_EQ(notes(m),
-             "m.mtl:3: texture.png is not a TGA file, left out\nm.mtl:4: gone.tga does not exist, left out\n");
+             "m.mtl:3: 'texture.png' is not a TGA file, left out\nm.mtl:4: 'gone.tga' does not exist, left out\n");
     folder.picture("m_diffuse.tga", 10);
     CHECK_EQ(maps(Model(folder / "m.obj")), "10 -1 -1 -1 -1, 10 -1 -1 -1 -1");  // instead
     folder.write("m.obj", "mtllib m.mtl\nusemtl unused\n" + textured);
     CHECK_THROWS(Model(folder / "m.obj"), "bad.tga: ");
 }
 
-TEST("errors come in a fixed order: the .obj, the .mtl, then the textures") {
+TEST("errors come in a fixed order: the .obj, the .mtl, then the textures by their names") {
     const Folder folder;
     folder.write("m.mtl", "Kd x\n");
     for (const char* name : {"m_spec.tga", "m_diffuse.tga", "m_nm.tga", "m_glow.tga"}) folder.write(name, "no picture");
     folder.write("m.obj", "mtllib m.mtl\n" + textured + "f 0 0 0\n");
     CHECK_THROWS(Model(folder / "m.obj"), "m.obj:13: vertex index 0");
     folder.write("m.obj", "mtllib m.mtl\n" + textured);
-    CHECK_THROWS(Model(folder / "m.obj"), "m.mtl:1: 'x' is no number");
+    CHECK_THROWS(Model(folder / "m.obj"), "m.mtl:1: 'x' is no finite number");
     folder.write("m.mtl", "");
     for (int i = 0; i < 50; i++) CHECK_THROWS(Model(folder / "m.obj"), "m_diffuse.tga: ");
     fs::remove(folder / "m_diffuse.tga");
-    for (int i = 0; i < 50; i++) CHECK_THROWS(Model(folder / "m.obj"), "m_nm.tga: ");
+    for (int i = 0; i < 50; i++) CHECK_THROWS(Model(folder / "m.obj"), "m_glow.tga: ");
 }
 
 TEST("grey pictures are widened where three channels are read, and are no normal maps") {
@@ -1149,52 +1099,18 @@ bool survives(const fs::path& obj) {
 }
 
 std::string mutated(std::string s, std::mt19937& random) {
-    static const char* const tokens[] = {"v ",
-                                         "vt ",
-                                         "vn ",
-                                         "f ",
-                                         "/",
-                                         "//",
-                                         "-1",
-                                         "0",
-                                         "1e999",
-                                         "nan",
-                                         "\\\n",
-                                         "\r\n",
-                                         "#",
-                                         "usemtl a\n",
-                                         "999",
-                                         "-",
-                                         ".",
-                                         "e308",
-                                         "1e-320 ",
-                                         "\t",
-                                         "mtllib m.mtl\n",
-                                         "newmtl b\n",
-                                         "map_Kd ",
-                                         "Kd ",
-                                         "1 2 3 4 5 6 7 8"};
+    static const char* const tokens[] = {
+        "v ", "vt ", "vn ", "f ", "/", "//", "-1", "0", "1e999", "nan", "\\\n", "\r\n", "#", "usemtl a\n", "999", "-", ".", "e308",
+        "1e-320 ", "\t", "mtllib m.mtl\n", "newmtl b\n", "map_Kd ", "Kd ", "1 2 3 4 5 6 7 8"};
     for (auto n = 1 + random() % 4; n-- > 0;) {
         const std::size_t at = s.empty() ? 0 : random() % s.size(), length = random() % 12;
-        switch (random() % 6) {
-            case 0:
-                s.insert(at, tokens[random() % std::size(tokens)]);
-                break;
-            case 1:
-                s.erase(at, length);
-                break;
-            case 2:
-                s.insert(at, s.substr(s.empty() ? 0 : random() % s.size(), length * 4));
-                break;
-            case 3:
-                if (!s.empty()) s[at] = static_cast<char>(random());
-                break;
-            case 4:
-                if (!s.empty()) s[at] = static_cast<char>('0' + random() % 10);
-                break;
-            default:
-                if (random() % 8 == 0) s.resize(at);
-        }
+        const auto what = random() % 6;
+        if (what == 0) s.insert(at, tokens[random() % std::size(tokens)]);
+        if (what == 1) s.erase(at, length);
+        if (what == 2) s.insert(at, s.substr(s.empty() ? 0 : random() % s.size(), length * 4));
+        if (what == 3 && !s.empty()) s[at] = static_cast<char>(random());
+        if (what == 4 && !s.empty()) s[at] = static_cast<char>('0' + random() % 10);
+        if (what == 5 && random() % 8 == 0) s.resize(at);
     }
     return s;
 }
