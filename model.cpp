@@ -227,6 +227,9 @@ public:
     Corner* corners_of(int face) { return corners.data() + 3 * std::ptrdiff_t{face}; }
 
     Obj(const fs::path& path, const Text& text) : Scanner(path, text.begin, text.end) {
+        // About what a mesh of many faces comes to: to grow costs a copy and fresh memory, a fifth of the loading time.
+        const std::ptrdiff_t bytes = text.end - text.begin;
+        verts.reserve(bytes / 96), uvs.reserve(bytes / 96), normals.reserve(bytes / 96), corners.reserve(bytes / 32);
         for (; !is_done(); next_line()) {
             const std::string_view first = word();
             if (first == "v") verts.push_back(vector<3>(3, "a vertex needs three coordinates"));
