@@ -39,8 +39,9 @@ public:
 
     // Reads an .obj and the textures beside it. Throws std::runtime_error "FILE:LINE: what" (LINE counts from 1),
     // "FILE: what" for a file that cannot be read or has no face, and what TGAImage::read_tga_file throws.
-    // Takes at most 256 times the size of the files and 384 KiB, plus 1 GiB for copies of pictures that materials share
-    // (more is an error). Textures are not decoded for faces without texture coordinates.
+    // Takes at most 256 times the size of the files and 160 KiB, plus 1 GiB for copies of pictures that materials share
+    // (more is an error). A file must not become shorter while it is read, because it may be mapped. Concave polygons
+    // with more than 1000 corners stay fans, with a note. Textures are decoded where faces have coordinates of them.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
 
     // What the user may want to know and is no error, one line each without the file's name at its head.

@@ -60,7 +60,7 @@ bool is_finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) 
 bool is_picture(const TGAImage& map, int least_bytes) { return map.empty() || map.bytespp() >= least_bytes; }
 
 std::size_t bytes(const TGAImage& map) {
-    return static_cast<std::size_t>(map.width() * map.bytespp()) * static_cast<std::size_t>(map.height());
+    return std::size_t{1} * map.width() * map.bytespp() * map.height();
 }
 
 void check(const Model& model) {
@@ -84,8 +84,8 @@ void check(const Model& model) {
     for (const Model::Group& g : model.groups()) {
         REQUIRE(g.begin == end && g.end > g.begin);
         end = g.end;
-        REQUIRE(g.material >= 0 && static_cast<std::size_t>(g.material) < used.size());
-        REQUIRE(!used[static_cast<std::size_t>(g.material)]++);
+        REQUIRE(g.material >= 0 && g.material < std::ssize(used));
+        REQUIRE(!used[g.material]++);
     }
     REQUIRE(end == model.nfaces());
     REQUIRE(std::all_of(used.begin(), used.end(), [](char u) { return u == 1; }));
@@ -125,9 +125,9 @@ void check_fit(Model& model) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static Files files;
-    // The window of a text file and what little else there is at once. The factor is more than twice what was measured:
-    // 98 for a long polygon (corners, tree, lists), 110 for a path of many folders.
-    static MemoryBound bound(384 << 10, 256);
+    // The fixed part is what a thread, a piece of a file and the messages take, the factor more than twice what was
+    // measured: paths of many folders take most.
+    static MemoryBound bound(160 << 10, 256);
     files.write({reinterpret_cast<const char*>(data), size});
 
     Model model;

@@ -203,25 +203,6 @@ TEST("lines of a megabyte") {
     CHECK_THROWS(load(continued + "x"), "model.obj:400005: 'x' is no vertex index");
 }
 
-TEST("lines of all lengths") {
-    std::mt19937 random(1);
-    std::string obj;
-    const int n = 40000;
-    for (int i = 0; i < n; i++) {
-        const char* const end = i % 3 == 0 ? "\r\n" : "\n";
-        obj += "v " + std::to_string(i) + (i % 5 == 0 ? "\\\n " : " ") + std::to_string(i + 1) + " 0" + end;
-        if (random() % 4 == 0) obj.append("#").append(random() % 400, '.').append(i % 7 == 0 ? "\\" : "").append(end);
-        if (random() % 4 == 0) obj.append(random() % 100, ' ').append(end);
-    }
-    const auto lines = std::count(obj.begin(), obj.end(), '\n');
-    const Model m = load(obj + "f 1 2 3");
-    bool right = m.nverts() == n;
-    for (int i = 0; right && i < n; i++) right = m.verts()[i] == vec3{i * 1., i + 1., 0};
-    CHECK(right);
-    const std::string where = "model.obj:" + std::to_string(lines + 1) + ": vertex index 0";
-    CHECK_THROWS(load(obj + "f 1 2 0"), where.c_str());
-}
-
 TEST("a byte order mark is skipped") {
     CHECK_EQ(load("\xEF\xBB\xBFv 5 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").verts()[0].x, 5);
     CHECK_THROWS(load("\xEF\xBB\xBF\n\nf 0 1 1"), "model.obj:3:");
@@ -239,8 +220,8 @@ TEST("o, g, s, lines, curves and unknown words are passed over") {
 TEST("numbers are read as strtod reads them, to the last bit") {
     std::vector<std::string> numbers = {
         "0", "-0", "+1", ".5", "-.5", "+.5", "5.", "1e3", "1E3", "1e+3", "1.5e-3", "-2.5E-10", "00012.50",
-        "999999999999999",
-        "9999999999999999", "0.1", "123456789.123456", "1.23456789012345", "0.000000000000001", "9007199254740993",
+        "999999999999999", "9999999999999999", "0.1", "123456789.123456", "1.23456789012345", "0.000000000000001",
+        "9007199254740993",
         "2.2250738585072014e-308", "5e-324", "1e-310", "1.7976931348623157e308", "0.30000000000000004",
         "179769313486231570000000000000e279", "100000000000000000000000000000000000000",
         "0.00000000000000000000000000000000001", "1e-400", "-1e-400", "0e999", "0.0e-999", "1e-99999999999999999999",
@@ -280,9 +261,8 @@ TEST("what is no finite number or no index is an error with its line") {
     const std::string long_number = "1" + std::string(400, '0');
     for (const std::string bad :
          {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309", "1e99999999999999999999", "nan(7)",
-          "179769313486231570000000000000e280", "1x", "1.2.3", "1e", "1e+", "1-2", "0x10", "1,5", "1_0", "1/2",
-          "1\\2", "x",
-          ".", "-", "+", "+-1", "-+1", "--1", "e5", ",5", "one", "\\1", "/"})
+          "179769313486231570000000000000e280", "1x", "1.2.3", "1e", "1e+", "1-2", "0x10", "1,5", "1_0", "1/2", "1\\2",
+          "x", ".", "-", "+", "+-1", "-+1", "--1", "e5", ",5", "one", "\\1", "/"})
         check_errors({{"\nv 0 " + bad + " 0\n", "2: '" + bad + "' is no finite number"},
                       {"\nvt " + bad + " 0\n", "2: '" + bad + "' is no finite number"},
                       {"\nvn 0 0 " + bad + "\n", "2: '" + bad + "' is no finite number"},
@@ -427,43 +407,12 @@ Polygon reversed(Polygon p) {
     return p;
 }
 
-bool touch(const vec2& a, const vec2& b, const vec2& c, const vec2& d) {  // segments ab and cd, ends included
-    const auto sign = [](double x) { return (x > 0) - (x < 0); };
-    const auto overlap = [](double p, double q, double r, double s) {
-        return std::max(std::min(p, q), std::min(r, s)) <= std::min(std::max(p, q), std::max(r, s));
-    };
-    return sign(area2(a, b, c)) * sign(area2(a, b, d)) <= 0 && sign(area2(c, d, a)) * sign(area2(c, d, b)) <= 0 &&
-           overlap(a.x, b.x, c.x, d.x) && overlap(a.y, b.y, c.y, d.y);
-}
-bool is_simple(const Polygon& p) {
-    const std::size_t n = p.size();
-    for (std::size_t i = 0; i < n; i++)
-        for (std::size_t j = i + 1; j < n; j++) {
-            const vec2 &a = p[i], &b = p[(i + 1) % n], &c = p[j], &d = p[(j + 1) % n];
-            if (j == i + 1 || (i == 0 && j == n - 1)) {  // neighbours: they must not fold back
-                const vec2 &from = j == i + 1 ? a : c, &at = j == i + 1 ? b : a, &to = j == i + 1 ? d : b;
-                if (area2(from, at, to) == 0 && dot(from - at, to - at) >= 0) return false;
-            } else if (touch(a, b, c, d)) {
-                return false;
-            }
-        }
-    return true;
-}
-
-// Random points in an order that crosses nowhere: crossings are undone, two edges at a time.
-Polygon random_polygon(std::mt19937& random, int n, int grid) {
+// Points on rays in the order of their angle, at random distances: concave as a rule, and it crosses nowhere.
+Polygon random_star(std::mt19937& random, int n) {
     Polygon p;
-    for (int i = 0; i < n; i++)
-        p.push_back({below(random, grid), below(random, grid)});
-    for (int round = 0; round < 200; round++) {
-        bool crossing = false;
-        for (std::size_t i = 0; i + 2 < p.size(); i++)
-            for (std::size_t j = i + 2; j < p.size(); j++)
-                if (!(i == 0 && j + 1 == p.size()) && touch(p[i], p[i + 1], p[j], p[(j + 1) % p.size()])) {
-                    std::reverse(p.begin() + i + 1, p.begin() + j + 1);
-                    crossing = true;
-                }
-        if (!crossing) break;
+    for (int i = 0; i < n; i++) {
+        const double angle = (i + below(random, 100) / 100) * 6.28 / n, r = 1000 + 100 * below(random, 1000);
+        p.push_back({std::round(r * std::cos(angle)), std::round(r * std::sin(angle))});
     }
     return p;
 }
@@ -476,14 +425,13 @@ TEST("concave polygons are covered exactly once, in any plane, from any first co
         {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}},  // an L
         {{0, 0}, {9, 0}, {9, 9}, {6, 9}, {6, 3}, {3, 3}, {3, 9}, {0, 9}},  // a U
         {{0, 0}, {2, 8}, {4, 1}, {6, 8}, {8, 1}, {10, 8}, {12, 0}, {12, -1}, {0, -1}},  // a comb
-        // a spiral
-        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2}, {0, 2}},
+        {{0, 0}, {10, 0}, {10, 10}, {2, 10}, {2, 4}, {6, 4}, {6, 6}, {4, 6}, {4, 8}, {8, 8}, {8, 2},
+         {0, 2}},  // a spiral
         {{0, 3}, {2, 2}, {3, 0}, {4, 2}, {6, 3}, {4, 4}, {3, 6}, {2, 4}},  // a star
         {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},  // a square, its sides halved
         {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3}},  // a triangle with five corners
     };
     for (Polygon p : shapes) {
-        CHECK(is_simple(p));
         for (std::size_t i = 0; i < p.size(); i++) {
             check_cut(p);
             check_cut(reversed(p));
@@ -492,29 +440,16 @@ TEST("concave polygons are covered exactly once, in any plane, from any first co
     }
 }
 
-TEST("random simple polygons are covered exactly once") {
+TEST("random stars are covered exactly once") {
     std::mt19937 random(3);
-    int tried = 0, concave = 0;
-    for (int i = 0; i < 2000; i++) {
-        const Polygon p = random_polygon(random, 4 + static_cast<int>(random() % 20), i % 2 ? 12 : 100);
-        if (!is_simple(p)) continue;
-        tried++;
-        const Cut result = cut(p, load(in_plane(p, {2, 1, 0}, {-1, 3, 1})));
-        CHECK_EQ(result.faces, static_cast<int>(p.size()) - 2);
-        CHECK_EQ(result.reversed, 0);
-        CHECK_EQ(result.empty, 0);
-        for (std::size_t k = 1; k + 1 < p.size(); k++) concave += area2(p[0], p[k], p[k + 1]) * area2(p) < 0;
-    }
-    CHECK(tried > 1000);
-    CHECK(concave > 1000);
+    for (int i = 0; i < 300; i++) check_cut(random_star(random, 4 + i));
 }
 
 TEST("a hole that a bridge joins to the outline, spikes and repeated corners") {
     // The bridge from (0,0) to (3,3) is walked twice.
     check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}}, true);
-    check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {5, 5}, {5, 7}, {7, 7}, {7, 5},
-               {5, 5}, {2, 2},
-               {2, 1}, {1, 1}}, true);
+    check_cut({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {5, 5}, {5, 7}, {7, 7}, {7, 5}, {5, 5},
+               {2, 2}, {2, 1}, {1, 1}}, true);
     check_cut({{0, 0}, {4, 0}, {4, 4}, {7, 9}, {4, 4}, {0, 4}}, true);  // outward
     check_cut({{0, 0}, {4, 0}, {4, 4}, {2, 1}, {4, 4}, {0, 4}}, true);  // inward
     check_cut({{0, 0}, {4, 0}, {8, 0}, {4, 0}, {4, 4}, {0, 4}}, true);  // along an edge
@@ -837,7 +772,7 @@ std::string maps(const Model& m) {
 
 }  // namespace
 
-TEST("textures beside the model are found by their suffix, and may be absent") {
+TEST("textures beside the model are found by their suffix, and may be absent; one normal map is decoded") {
     const Folder folder;
     const fs::path obj = folder.write("m.obj", textured);
     CHECK_EQ(maps(Model(obj)), "-1 -1 -1 -1 -1");
@@ -848,27 +783,17 @@ TEST("textures beside the model are found by their suffix, and may be absent") {
     CHECK_EQ(notes(m), "");
     CHECK_EQ(m.materials()[0].diffuse.get(1, 1)[2], 12);
     CHECK_EQ(m.materials()[0].specular.bytespp(), 1);
-    fs::remove(folder / "m_diffuse.tga");
-    CHECK_EQ(maps(Model(obj)), "-1 20 -1 40 50");
-    CHECK_EQ(maps(Model(folder.write("m.b.obj", textured))), "-1 -1 -1 -1 -1");
-    folder.picture("m.b_glow.tga", 60);
-    CHECK_EQ(maps(Model(folder / "m.b.obj")), "-1 -1 -1 -1 60");
-}
-
-TEST("of two normal maps only the wanted one is decoded") {
-    const Folder folder;
-    all_suffixes(folder);
-    const fs::path obj = folder.write("m.obj", textured);
-    CHECK_EQ(maps(Model(obj, NormalMap::object)), "10 20 -1 40 50");
     CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 -1 30 40 50");
     folder.write("m_nm.tga", "no picture");
     CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 -1 30 40 50");
     CHECK_THROWS(Model(obj, NormalMap::object), "m_nm.tga: ");
     fs::remove(folder / "m_nm.tga");
-    CHECK_EQ(maps(Model(obj, NormalMap::object)), "10 -1 30 40 50");
+    CHECK_EQ(maps(Model(obj)), "10 -1 30 40 50");
     folder.picture("m_nm.tga", 20);
     fs::remove(folder / "m_nm_tangent.tga");
     CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 20 -1 40 50");
+    folder.picture("m.b_glow.tga", 60);
+    CHECK_EQ(maps(Model(folder.write("m.b.obj", textured))), "-1 -1 -1 -1 60");
 }
 
 TEST("faces without texture coordinates have no textures, and none is decoded") {
@@ -1104,19 +1029,12 @@ bool survives(const fs::path& obj) {
 }
 
 std::string mutated(std::string s, std::mt19937& random) {
-    static const char* const tokens[] = {
-        "v ", "vt ", "vn ", "f ", "/", "//", "-1", "0", "1e999", "nan", "\\\n", "\r\n", "#", "usemtl a\n", "999",
-        "-", ".", "e308",
-        "1e-320 ", "\t", "mtllib m.mtl\n", "newmtl b\n", "map_Kd ", "Kd ", "1 2 3 4 5 6 7 8"};
-    for (auto n = 1 + random() % 4; n-- > 0;) {
-        const std::size_t at = s.empty() ? 0 : random() % s.size(), length = random() % 12;
-        const auto what = random() % 6;
-        if (what == 0) s.insert(at, tokens[random() % std::size(tokens)]);
-        if (what == 1) s.erase(at, length);
-        if (what == 2) s.insert(at, s.substr(s.empty() ? 0 : random() % s.size(), length * 4));
-        if (what == 3 && !s.empty()) s[at] = static_cast<char>(random());
-        if (what == 4 && !s.empty()) s[at] = static_cast<char>('0' + random() % 10);
-        if (what == 5 && random() % 8 == 0) s.resize(at);
+    const std::string alphabet = "vtnfumKd /-.#\\\r\n\t0123456789e\x80";
+    for (auto n = 1 + random() % 4; n-- > 0 && !s.empty();) {
+        const std::size_t at = random() % s.size();
+        if (random() % 3 == 0) s.erase(at, random() % 12);
+        else if (random() % 2) s.insert(at, s.substr(random() % s.size(), random() % 40));
+        else s[at] = alphabet[random() % alphabet.size()];
     }
     return s;
 }
@@ -1147,22 +1065,9 @@ TEST("mutated files give a model or an error, never a crash") {
     CHECK(loaded < n - n / 20);
 }
 
-TEST("random bytes give a model or an error, never a crash") {
+TEST("faces of random corners among random points, some of them at the ends of the range, give a model") {
     const Folder folder;
-    folder.write("m.mtl", "newmtl a\nKd 1 0 0\n");
     std::mt19937 random(10);
-    const std::string alphabet = "vvftnfvf   0123456789123412341234//-.\\\n\n\n\n\n\r\t#e+";
-    for (int i = 0; i < 3000; i++) {
-        std::string bytes;
-        for (auto n = random() % 300; n-- > 0;)
-            bytes += i % 3 == 0 ? static_cast<char>(1 + random() % 255) : alphabet[random() % alphabet.size()];
-        survives(folder.write("m.obj", i % 2 ? square + square + bytes + "\nf 1 2 3\n" : bytes));
-        if (i % 10 == 0) {
-            folder.write("m.mtl", bytes);
-            survives(folder.write("m.obj", "mtllib m.mtl\n" + textured));
-        }
-    }
-    // Faces of random corners among random points, some of them at the ends of the range.
     int loaded = 0;
     for (int i = 0; i < 1000; i++) {
         std::string obj;
