@@ -19,7 +19,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     vec3 light_dir{1, 1, 0};        // towards the light
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     enum class Shadow { map, exact, off } shadow = Shadow::map;
-    std::optional<double> bias;  // the lesson's constant, a depth of screen_depth; without it the bias is derived
+    std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
     std::vector<std::filesystem::path> models;
     std::filesystem::path out = ".";
@@ -35,7 +35,8 @@ struct DepthShader final : IShader {  // only the z-buffer is wanted: there is n
     DepthShader(const Model& m, const Camera& camera) : IShader(m, 0, m.nfaces()), uniform_PM(camera.to_clip()) {}
 
     vec4 vertex(int iface, int nthvert) override {
-        return uniform_PM * point(model.vert(iface, nthvert));  // read the vertex of the .obj, take it to clip space
+        // The vertex of the .obj, taken to clip space: draw() applies the Viewport and divides by w.
+        return uniform_PM * point(model.vert(iface, nthvert));
     }
 };
 
@@ -61,8 +62,8 @@ struct PhongShader final : IShader {
     vec3 uniform_l;        // light vector: towards the light, of length 1
     vec2 varying_uv[3];    // texture coordinates of a triangle: written by vertex(), read by fragment(), as those below
     vec3 varying_nrm[3];   // normals of the vertices
-    vec3 varying_tri[3];   // the triangle in eye coordinates
-    vec3 varying_sb[3];    // the triangle in the shadow buffer
+    vec3 varying_eye[3];   // the triangle in eye coordinates, for tangent-space normals
+    vec3 varying_sb[3];    // the triangle in the shadow buffer, for the bias and for exact shadows
 
     PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m, const Model::Group& group)
         : IShader(m, group.begin, group.end), opt(o), shadow(s), material(m.materials()[group.material]),
@@ -77,7 +78,7 @@ struct PhongShader final : IShader {
         varying_sb[nthvert] = project(shadow.M * point(v));
         if (material.normal.empty())
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
-        if (!material.tangent.empty()) varying_tri[nthvert] = (uniform_M * point(v)).xyz();
+        if (!material.tangent.empty()) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
         return uniform_PM * point(v);
     }
 
@@ -94,11 +95,11 @@ struct PhongShader final : IShader {
             const vec<3, real> r = n * (2 * dot(n, l)) - l;  // reflected light; the viewer is far off at +z
             spec = select(facing & (r.z > 0), power(r.z, Texels(material.specular, uv)[0]), 0);
         }
-        const real shade = .3 + .7 * select(lit, 1, 0);
+        const real shadow_factor = .3 + .7 * select(lit, 1, 0);
         const Color glow = material.glow.empty() ? Color{0, 0, 0} : Texels(material.glow, uv).bgr();
         Color c;
-        for (int i = 0; i < 3; i++)
-            c[i] = 20 + texel[i] * material.Kd[2 - i] * ((1.2 * diff + .6 * spec) * shade) + glow[i];
+        for (int i = 0; i < 3; i++)  // Kd has red first
+            c[i] = 20 + texel[i] * material.Kd[2 - i] * ((1.2 * diff + .6 * spec) * shadow_factor) + glow[i];
 
         // --draw: when something is wrong, these are the first two things to look at.
         if (opt.draw == Options::Draw::shadow) c = Color{1, 1, 1} * select(facing, select(lit, 255, 0), 128);
@@ -114,7 +115,7 @@ struct PhongShader final : IShader {
         const coord stored = shadow.shadowbuffer.at(sb_p);
         // With --bias 0 surfaces shadow themselves here and there: z-fighting. The text's cure is --bias 43.34.
         const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, varying_sb);
-        return !(stored > sb_p.z + bias);
+        return !(stored > sb_p.z + bias);  // so written because nothing but a number shadows
     }
 
     vec<3, real> normal(const vec<2, coord>& uv, const vec<3, coord>& bar) const {  // of length 1
@@ -125,10 +126,10 @@ struct PhongShader final : IShader {
         // Darboux frame (i, j, n): i is the direction across n in which u grows, at a right angle to the one along the
         // face in which u stays the same; j that of v. Found one by one, because a mirrored texture turns one of them
         // round. No frame where uv do not span a plane.
-        const vec3 e1 = varying_tri[1] - varying_tri[0], e2 = varying_tri[2] - varying_tri[0];
+        const vec3 e1 = varying_eye[1] * .5 - varying_eye[0] * .5, e2 = varying_eye[2] * .5 - varying_eye[0] * .5;
         const vec2 du = normalized(vec2{varying_uv[1].x - varying_uv[0].x, varying_uv[2].x - varying_uv[0].x});
         const vec2 dv = normalized(vec2{varying_uv[1].y - varying_uv[0].y, varying_uv[2].y - varying_uv[0].y});
-        const real side = select(dot(normalized(cross(e1, e2)), n) < 0, -1, 1);  // the normal's side of the face
+        const real side = select(dot(cross(normalized(e1), normalized(e2)), n) < 0, -1, 1);  // of the face that n is on
         const vec<3, real> i = normalized(cross(normalized(e2 * du.x - e1 * du.y), n)) * side;
         const vec<3, real> j = normalized(cross(normalized(e2 * dv.x - e1 * dv.y), n)) * side;
         const vec<3, real> t = Texels(material.tangent, uv).normal();
@@ -144,17 +145,17 @@ static void first_pass(const Options& opt, const std::vector<Model>& models, Sha
     if (opt.shadow == Options::Shadow::off) return;
     const bool exact = opt.shadow == Options::Shadow::exact, classic = opt.bias && !exact;
     const int size = exact ? LightGrid::good_cells(models) : opt.shadow_size;
-    Camera light{lookat(opt.light_dir, {0, 0, 0}, opt.up), projection(0), middle_viewport(size, size)};
+    Camera light{lookat(opt.light_dir, opt.center, opt.up), projection(0), middle_viewport(size, size)};
     if (!classic) light = fitted(light, models, size);
     shadow.M = light.to_screen();
     if (exact) {
         shadow.grid = LightGrid(models, light, size);
         return;
     }
-    if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;
+    if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;  // M stays: drawn aside, read in place
     std::vector<DepthShader> shaders;
     for (const Model& model : models) shaders.emplace_back(model, light);
-    if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);
+    if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);  // kept from frame to frame
     draw(shaders, light.Viewport, shadow.shadowbuffer);
 }
 

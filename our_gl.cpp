@@ -100,7 +100,7 @@ public:
     explicit Pool(int threads) {
         try {
             for (int me = 1; me < threads; me++) others_.emplace_back([this, me] { work_in_rounds(me); });
-        } catch (const std::system_error&) {
+        } catch (const std::exception&) {
             // no more threads to be had: those that run share the work
         }
     }
@@ -183,7 +183,9 @@ namespace {
 // Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers; depth and barycentric
 // coordinates come from the corners as they are.
 constexpr int subpixel_bits = 16;
-constexpr int most_corners = 8;  // of a triangle cut by the near plane and four guard planes
+// Of a triangle cut by five planes. A plane adds one corner to what is convex; where rounding bends a face seen edge-on
+// it may add one for every two: 3, 4, 6, 9, 13, 19.
+constexpr int most_corners = 19;
 
 // The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the
 // rounding of a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then
@@ -734,7 +736,8 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
             const vec3* const p = &corners_[std::size_t{3} * f];
             const auto [x0, x1] = std::minmax({p[0].x, p[1].x, p[2].x});
             const auto [y0, y1] = std::minmax({p[0].y, p[1].y, p[2].y});
-            sum += ((x1 - x0) * scale_ + 1) * ((y1 - y0) * scale_ + 1);
+            sum += (cell_of(x1 * scale_) - cell_of(x0 * scale_) + 1.) *
+                   (cell_of(y1 * scale_) - cell_of(y0 * scale_) + 1.);
         }
         return sum;
     };

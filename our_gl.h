@@ -130,7 +130,7 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
 INLINED vec<2, coord> wrapped(const vec<2, coord>& uv) {
     return componentwise<2, coord>([&](int i) {
         const coord f = uv[i] - floor(uv[i]);
-        return select((f < 0) | !(f == f), coord(0), f);
+        return select(f == f, f, 0);
     });
 }
 
@@ -140,12 +140,12 @@ public:
     INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
         const int w = map.width(), h = map.height();
         const pack<std::int32_t> x = min(to_int(uv.x * w), w - 1), y = min(to_int(uv.y * h), h - 1);
-        std::int32_t index[lanes];  // modulo 2^32: a picture may have more than 2^31 pixels
-        (y * w + x).store(index);
+        std::uint32_t index[lanes];  // a picture may have up to 2^32 pixels
+        (converted<std::uint32_t>(y) * w + converted<std::uint32_t>(x)).store(index);
         const std::uint8_t* const first = map.pixel(0, 0);
         std::int32_t bytes[lanes];
         for (int i = 0; i < lanes; i++)
-            std::memcpy(&bytes[i], first + std::size_t{static_cast<std::uint32_t>(index[i])} * map.bytespp(), 4);
+            std::memcpy(&bytes[i], first + std::size_t{index[i]} * map.bytespp(), 4);
         bytes_ = pack<std::int32_t>(bytes);
     }
     INLINED real operator[](int channel) const {
@@ -225,7 +225,7 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
 class LightGrid {
 public:
     LightGrid() = default;
-    // The light's screen is cells x cells large and shows all faces. Takes at most 720 bytes a face and 4 a cell.
+    // The light's screen is cells x cells large and shows all faces. Takes at most 584 bytes a face and 4 a cell.
     LightGrid(const std::vector<Model>& models, const Camera& light, int cells);
 
     // About one cell a face: measured, fewer make long lists and more take longer to fill than they save.

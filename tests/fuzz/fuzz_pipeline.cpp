@@ -212,9 +212,9 @@ void check_grid(Input& in, const std::vector<Model>& models, const vec3& to_ligh
         const bool dark = grid.shadows(vec3{x, y, z}, in.upto(static_cast<unsigned>(faces)));
         REQUIRE(!dark || (x >= low && y >= low && x <= high && y <= high));
     }
-    // 64 places in lists for each face and its three corners; a box of the mean size touches up to 81 cells, not 64.
+    // 64 places in lists for each face, and its three corners.
     const auto n = static_cast<std::size_t>(faces), lists = static_cast<std::size_t>(cells * cells + 2);
-    REQUIRE(grid.bytes() <= n * (3 * sizeof(vec3) + 81 * 8) + lists * 4);
+    REQUIRE(grid.bytes() <= n * (3 * sizeof(vec3) + 64 * 8) + lists * 4);
 }
 
 // Numbers that give the same doubles back.
