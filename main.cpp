@@ -183,30 +183,30 @@ struct Value {
     [[noreturn]] void fail(const std::string& wanted) const {
         throw UsageError(option + ": \"" + text + "\" is not " + wanted);
     }
-    template <class... T>
-    bool is(const char* format, T*... parts) const {  // as scanf has it, and nothing behind it
-        char rest;
-        return std::sscanf(text.c_str(), (std::string(format) + "%c").c_str(), parts..., &rest) == sizeof...(parts);
-    }
     void read(double& n) const {
-        if (!is("%lf", &n) || !std::isfinite(n)) fail("a number");
+        char rest;  // what follows the last number, which nothing should
+        if (std::sscanf(text.c_str(), "%lf%c", &n, &rest) != 1 || !std::isfinite(n)) fail("a number");
     }
     void read(int& n, int most) const {
-        if (!is("%5d", &n) || n < 1 || n > most) fail("1 to " + std::to_string(most));
+        char rest;
+        if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most)
+            fail("1 to " + std::to_string(most));
     }
     void read_size(int& w, int& h) const {
-        if (!is("%5dx%5d", &w, &h) || std::min(w, h) < 1 || std::max(w, h) > max_size)
+        char rest;
+        if (std::sscanf(text.c_str(), "%5dx%5d%c", &w, &h, &rest) != 2 || std::min(w, h) < 1 ||
+            std::max(w, h) > max_size)
             fail("WxH, each 1 to " + std::to_string(max_size));
     }
     void read(vec3& v) const {
-        if (!is("%lf,%lf,%lf", &v.x, &v.y, &v.z) || !(norm(v) <= 1e307))
+        char rest;
+        if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(norm(v) <= 1e307))
             fail("three numbers X,Y,Z, a length of at most 1e307");
     }
-    template <class Enum>
-    void read(Enum& value, const std::vector<std::string>& names) const {  // in the order of its values
+    int one_of(const std::vector<std::string>& names) const {  // which
         const auto found = std::find(names.begin(), names.end(), text);
         if (found == names.end()) fail(names[0] + ", " + names[1] + " or " + names[2]);
-        value = static_cast<Enum>(found - names.begin());
+        return static_cast<int>(found - names.begin());
     }
 };
 
@@ -227,11 +227,11 @@ static const Option options[] = {
     {"--light", "X,Y,Z", "direction towards the light (1,1,0)",
      [](Options& o, const Value& v) { v.read(o.light_dir); }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
-     [](Options& o, const Value& v) { v.read(o.shadow, {"map", "exact", "off"}); }},
+     [](Options& o, const Value& v) { o.shadow = Options::Shadow(v.one_of({"map", "exact", "off"})); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
      [](Options& o, const Value& v) { v.read(o.bias.emplace()); }},
     {"--draw", "WHAT", "color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)",
-     [](Options& o, const Value& v) { v.read(o.draw, {"color", "shadow", "normal"}); }},
+     [](Options& o, const Value& v) { o.draw = Options::Draw(v.one_of({"color", "shadow", "normal"})); }},
     {"--tangent", "", "prefer a tangent-space normal map to an object-space one",
      [](Options& o, const Value&) { o.tangent = true; }},
     {"--no-fit", "", "keep a model's own coordinates (default: fit what is beyond [-1,1]^3 or too small to see)",
