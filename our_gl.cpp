@@ -691,8 +691,10 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImag
 //   fragment is lit: no face shadows itself, at any angle.
 // - The caster: what is above may fall, on its way from there to the fragment, as far as to the next texel's depth.
 //   Along each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are
-//   lower, half. And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most;
-//   coverage is snapped by half a sub-pixel.
+//   lower, half. What is one texel thin, with nothing on either side, may fall without end: it throws no shadow.
+//
+// And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most; coverage is
+// snapped by half a sub-pixel.
 coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored,
                    const vec3 (&face)[3]) {
     constexpr double depth_rounding = 1. / (1 << 14);
