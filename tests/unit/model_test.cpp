@@ -293,6 +293,8 @@ TEST("too few numbers or corners, an index of zero or out of range are errors wi
         {square + "f 1 2 0\n", "5: vertex index 0 (indices count from 1)"},
         {square + extras + "f 1 2 3/0\n", "11: texture index 0 (indices count from 1)"},
         {square + extras + "f 1 2 3//-0\n", "11: normal index 0 (indices count from 1)"},
+        {square + "vt 0 0\nvt 1 0\nvn 0 0 1\nf 1//2 2 3\n", "8: normal index 2, but the file has only 1"},
+        {square + "vt 0 0\nvn 0 0 1\nvn 1 0 0\nf 1/2 2 3\n", "8: texture index 2, but the file has only 1"},
         {square + "f 1 2 5\n\nf 1 2 3\n", "5: vertex index 5, but the file has only 4"},
         {square + "f 1 2 3\nf 1/1 2 3\n", "6: texture index 1, but the file has only 0"},
         {square + extras + "f 1//4 2 3\n", "11: normal index 4, but the file has only 3"},
