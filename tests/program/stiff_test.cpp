@@ -283,6 +283,20 @@ TEST("coordinates: texture coordinates of any size") {
         CHECK(draw(t) == draw(".25"));
 }
 
+// Its corners' differences are beyond the range of a double; the frame needs their directions alone.
+TEST("coordinates: a tangent-space normal map on a face of 1e308") {
+    const auto draw = [](const std::string& exponent) {  // all over the picture
+        const std::string low = "-.5e" + exponent, high = "1.5e" + exponent;
+        const Scene f("v " + low + ' ' + low + " 0\nv " + high + ' ' + low + " 0\nv " + low + ' ' + high +
+                      " 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n");
+        TGAImage slanted(1, 1, TGAImage::RGB);
+        slanted.set(0, 0, {{200, 128, 230, 255}});  // to the right and towards the viewer
+        slanted.write_tga_file(f / "m_nm_tangent.tga");
+        return f.good("--no-fit --size 2x2 --eye 0,0,4 --light 0,0,1 --draw normal").frame;
+    };
+    CHECK(draw("308") == draw("6"));
+}
+
 TEST("triangles: a repeated index and collinear corners draw nothing and change nothing") {
     const std::string line = "v -1 -.5 0\nv 0 0 0\nv 1 .5 0\n";
     const Scene plain(yard()), more(yard() + line + "f -3 -2 -1\nf -1 -1 -2\nf -2 -2 -2\nf -3 -1 -3\n");
