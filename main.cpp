@@ -18,7 +18,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     int shadow_size = 800;          // of the shadow buffer, in pixels a side
     vec3 light_dir{1, 1, 0};        // towards the light
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
-    enum class Shadow { map, exact, off } shadow = Shadow::map;
+    enum class Method { map, exact, off } method = Method::map;  // of shadows
     std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
     std::vector<std::filesystem::path> models;
@@ -108,8 +108,8 @@ struct PhongShader final : IShader {
     }
 
     mask in_light(const Fragment& f) const {
-        if (opt.shadow == Options::Shadow::off) return true;
-        if (opt.shadow == Options::Shadow::exact)
+        if (opt.method == Options::Method::off) return true;
+        if (opt.method == Options::Method::exact)
             return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
         const vec<3, coord> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
         const coord stored = shadow.shadowbuffer.at(sb_p);
@@ -142,8 +142,8 @@ struct PhongShader final : IShader {
 // Rendering the shadow buffer: the camera stands at the light. It is fitted to the models, so that no texel is wasted;
 // but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
 static void first_pass(const Options& opt, const std::vector<Model>& models, Shadow& shadow) {
-    if (opt.shadow == Options::Shadow::off) return;
-    const bool exact = opt.shadow == Options::Shadow::exact, classic = opt.bias && !exact;
+    if (opt.method == Options::Method::off) return;
+    const bool exact = opt.method == Options::Method::exact, classic = opt.bias && !exact;
     const int size = exact ? LightGrid::good_cells(models) : opt.shadow_size;
     Camera light{lookat(opt.light_dir, opt.center, opt.up), projection(0), middle_viewport(size, size)};
     if (!classic) light = fitted(light, models, size);
@@ -227,7 +227,7 @@ static const Option options[] = {
     {"--light", "X,Y,Z", "direction towards the light (1,1,0)",
      [](Options& o, const Value& v) { v.read(o.light_dir); }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
-     [](Options& o, const Value& v) { o.shadow = Options::Shadow(v.one_of({"map", "exact", "off"})); }},
+     [](Options& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
      [](Options& o, const Value& v) { v.read(o.bias.emplace()); }},
     {"--draw", "WHAT", "color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)",
@@ -332,7 +332,7 @@ static void run(Options opt) {
     const double written = milliseconds();
     if (opt.quiet) return;
     std::string left_out = missing_maps(models);
-    if (opt.shadow == Options::Shadow::off) left_out += left_out.empty() ? "shadow" : ",shadow";
+    if (opt.method == Options::Method::off) left_out += left_out.empty() ? "shadow" : ",shadow";
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
                 "shadow_bytes %zu outside %ld between_samples %ld hidden %ld left_out %s\n",
                 c.triangles, c.shaded, c.shaded, loaded - start, median(depth_ms), median(shade_ms), written - drawn,
