@@ -454,13 +454,6 @@ std::optional<mat<n, n, T>> invert(mat<n, n, T> a) {
     return out;
 }
 
-// What M does to directions: M without its translation.
-template <typename T>
-constexpr mat<4, 4, T> linear_part(mat<4, 4, T> m) {
-    for (int i = 0; i < 3; i++) m[i][3] = 0;
-    return m;
-}
-
 // What carries normals where M carries points: the inverse, transposed.
 template <int n, typename T>
 std::optional<mat<n, n, T>> invert_transpose(const mat<n, n, T>& m) {

@@ -68,7 +68,7 @@ struct PhongShader final : IShader {
     PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m, const Model::Group& group)
         : IShader(m, group.begin, group.end), opt(o), shadow(s), material(m.materials()[group.material]),
           uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
-          uniform_MIT(invert_transpose(linear_part(uniform_M)).value()),
+          uniform_MIT(invert_transpose(uniform_M).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
           uniform_l(normalized((uniform_M * direction(normalized(opt.light_dir))).xyz())) {}
 
