@@ -182,6 +182,7 @@ INLINED coord abs(const coord& a) { return each(a, [](double v) { return std::fa
 template <int n, typename T = double>
 struct vec {
     T data[n] = {};
+    bool operator==(const vec&) const = default;
     constexpr T& operator[](int i) { assert(i >= 0 && i < n); return data[i]; }
     constexpr const T& operator[](int i) const { assert(i >= 0 && i < n); return data[i]; }
 };
@@ -189,6 +190,7 @@ struct vec {
 template <typename T>
 struct vec<2, T> {
     T x{}, y{};
+    bool operator==(const vec&) const = default;
     constexpr T& operator[](int i) { assert(i >= 0 && i < 2); return i ? y : x; }
     constexpr const T& operator[](int i) const { assert(i >= 0 && i < 2); return i ? y : x; }
 };
@@ -196,6 +198,7 @@ struct vec<2, T> {
 template <typename T>
 struct vec<3, T> {
     T x{}, y{}, z{};
+    bool operator==(const vec&) const = default;
     constexpr T& operator[](int i) { assert(i >= 0 && i < 3); return i ? (i == 1 ? y : z) : x; }
     constexpr const T& operator[](int i) const { assert(i >= 0 && i < 3); return i ? (i == 1 ? y : z) : x; }
 };
@@ -203,6 +206,7 @@ struct vec<3, T> {
 template <typename T>
 struct vec<4, T> {
     T x{}, y{}, z{}, w{};
+    bool operator==(const vec&) const = default;
     constexpr T& operator[](int i) { assert(i >= 0 && i < 4); return i < 2 ? (i ? y : x) : (i == 2 ? z : w); }
     constexpr const T& operator[](int i) const {
         assert(i >= 0 && i < 4);
@@ -245,13 +249,6 @@ INLINED constexpr vec<n, T> operator*(const std::type_identity_t<T>& s, const ve
 template <int n, typename T>
 INLINED constexpr vec<n, T> operator/(const vec<n, T>& a, const std::type_identity_t<T>& s) {
     return componentwise<n, T>([&](int i) { return a[i] / s; });
-}
-
-template <int n, typename T>
-constexpr bool operator==(const vec<n, T>& a, const vec<n, T>& b) {
-    for (int i = 0; i < n; i++)
-        if (a[i] != b[i]) return false;
-    return true;
 }
 
 template <int n, typename T, typename S>
@@ -346,6 +343,7 @@ INLINED constexpr vec<3, T> project(const vec<4, T>& h) {
 template <int nrows, int ncols, typename T = double>
 struct mat {
     vec<ncols, T> rows[nrows] = {};
+    bool operator==(const mat&) const = default;
 
     constexpr vec<ncols, T>& operator[](int i) { assert(i >= 0 && i < nrows); return rows[i]; }
     constexpr const vec<ncols, T>& operator[](int i) const { assert(i >= 0 && i < nrows); return rows[i]; }
@@ -379,13 +377,6 @@ constexpr mat<r, c, T> operator*(const mat<r, k, T>& a, const mat<k, c, T>& b) {
 }
 
 template <int r, int c, typename T>
-constexpr bool operator==(const mat<r, c, T>& a, const mat<r, c, T>& b) {
-    for (int i = 0; i < r; i++)
-        if (!(a[i] == b[i])) return false;
-    return true;
-}
-
-template <int r, int c, typename T>
 constexpr mat<c, r, T> transpose(const mat<r, c, T>& m) {
     mat<c, r, T> out;
     for (int i = 0; i < r; i++)
@@ -394,64 +385,31 @@ constexpr mat<c, r, T> transpose(const mat<r, c, T>& m) {
 }
 
 // The inverse, or nothing where the matrix is singular to working precision (or holds a NaN or an infinity).
-// Gauss-Jordan elimination with full pivoting, after rows and columns have been scaled by powers of two (exactly) to a
-// largest element in [1,2): so the verdict does not depend on units. The largest pivot left is then compared with the
-// rounding that n steps can leave in a matrix of elements below 2: 2n units of the last place.
+// Gauss-Jordan elimination. The verdict is the diagonal of |M^-1| |M|, a condition number that no choice of units for
+// rows and columns changes: n steps may round by 2n units of the last place times that.
 template <int n, typename T>
-std::optional<mat<n, n, T>> invert(mat<n, n, T> a) {
-    int row_exponent[n], col_exponent[n];
-    const auto largest_exponent = [](const vec<n, T>& v) -> std::optional<int> {
-        T largest = 0;
-        for (int i = 0; i < n; i++) {
-            if (!std::isfinite(v[i])) return {};
-            largest = std::fmax(largest, std::fabs(v[i]));
-        }
-        if (!(largest > 0)) return {};
-        return std::ilogb(largest);
-    };
-    for (int i = 0; i < n; i++) {
-        const auto e = largest_exponent(a[i]);
-        if (!e) return {};
-        row_exponent[i] = *e;
-        for (int j = 0; j < n; j++) a[i][j] = std::scalbn(a[i][j], -*e);
-    }
-    for (int j = 0; j < n; j++) {
-        const auto e = largest_exponent(a.col(j));
-        if (!e) return {};
-        col_exponent[j] = *e;
-        for (int i = 0; i < n; i++) a[i][j] = std::scalbn(a[i][j], -*e);
-    }
-
-    auto inv = mat<n, n, T>::identity();
-    int order[n];  // order[k]: the column that was eliminated with row k
-    bool used[n] = {};
+std::optional<mat<n, n, T>> invert(const mat<n, n, T>& m) {
+    mat<n, n, T> a = m, inverse = mat<n, n, T>::identity();
     for (int k = 0; k < n; k++) {
-        int pr = k, pc = 0;
-        T best = -1;
-        for (int i = k; i < n; i++)
-            for (int j = 0; j < n; j++)
-                if (!used[j] && std::fabs(a[i][j]) > best) best = std::fabs(a[i][j]), pr = i, pc = j;
-        if (!(best > 2 * n * std::numeric_limits<T>::epsilon())) return {};
-        std::swap(a[k], a[pr]);
-        std::swap(inv[k], inv[pr]);
-        used[pc] = true;
-        order[k] = pc;
-        const T pivot = a[k][pc];
-        a[k] = a[k] / pivot;
-        inv[k] = inv[k] / pivot;
+        int pivot = k;
+        for (int i = k + 1; i < n; i++)
+            if (std::fabs(a[i][k]) > std::fabs(a[pivot][k])) pivot = i;
+        std::swap(a[k], a[pivot]);
+        std::swap(inverse[k], inverse[pivot]);
+        inverse[k] = inverse[k] / a[k][k];
+        a[k] = a[k] / a[k][k];
         for (int i = 0; i < n; i++) {
             if (i == k) continue;
-            const T factor = a[i][pc];
-            a[i] = a[i] - a[k] * factor;
-            inv[i] = inv[i] - inv[k] * factor;
+            inverse[i] = inverse[i] - inverse[k] * a[i][k];
+            a[i] = a[i] - a[k] * a[i][k];
         }
     }
-
-    mat<n, n, T> out;
-    for (int k = 0; k < n; k++)
-        for (int j = 0; j < n; j++)
-            out[order[k]][j] = std::scalbn(inv[k][j], -col_exponent[order[k]] - row_exponent[j]);
-    return out;
+    for (int i = 0; i < n; i++) {
+        T condition = 0;
+        for (int k = 0; k < n; k++) condition += std::fabs(inverse[i][k] * m[k][i]);
+        if (!(condition * 2 * n * std::numeric_limits<T>::epsilon() < 1)) return {};
+    }
+    return inverse;
 }
 
 // What carries normals where M carries points: the inverse, transposed.

@@ -76,27 +76,27 @@ struct PhongShader final : IShader {
         const vec3& v = model.vert(iface, nthvert);
         varying_uv[nthvert] = model.uv(iface, nthvert);
         varying_sb[nthvert] = project(shadow.M * point(v));
-        if (material.normal.empty())
+        if (!material.normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
-        if (!material.tangent.empty()) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
+        if (material.tangent) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
         return uniform_PM * point(v);
     }
 
     Color fragment(const Fragment& f) const override {
         const vec<2, coord> uv = wrapped(interpolated(varying_uv, f.bar));
-        const Color texel = material.diffuse.empty() ? Color{255, 255, 255} : Texels(material.diffuse, uv).bgr();
+        const Color texel = material.diffuse ? Texels(*material.diffuse, uv).bgr() : Color{255, 255, 255};
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
         const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow, no highlight
         const mask lit = any(facing) ? in_light(f) : false;
         real spec = 0;
-        if (any(facing) && !material.specular.empty()) {
+        if (any(facing) && material.specular) {
             const vec<3, real> r = n * (2 * dot(n, l)) - l;  // reflected light; the viewer is far off at +z
-            spec = select(facing & (r.z > 0), power(r.z, Texels(material.specular, uv)[0]), 0);
+            spec = select(facing & (r.z > 0), power(r.z, Texels(*material.specular, uv)[0]), 0);
         }
         const real shadow_factor = .3 + .7 * select(lit, 1, 0);
-        const Color glow = material.glow.empty() ? Color{0, 0, 0} : Texels(material.glow, uv).bgr();
+        const Color glow = material.glow ? Texels(*material.glow, uv).bgr() : Color{0, 0, 0};
         Color c;
         for (int i = 0; i < 3; i++)  // Kd has red first
             c[i] = 20 + texel[i] * material.Kd[2 - i] * ((1.2 * diff + .6 * spec) * shadow_factor) + glow[i];
@@ -119,10 +119,10 @@ struct PhongShader final : IShader {
     }
 
     vec<3, real> normal(const vec<2, coord>& uv, const vec<3, coord>& bar) const {  // of length 1
-        if (!material.normal.empty())
-            return normalized((uniform_MIT * direction(Texels(material.normal, uv).normal())).xyz());
+        if (material.normal)
+            return normalized((uniform_MIT * direction(Texels(*material.normal, uv).normal())).xyz());
         const vec<3, real> n = normalized(to_real(interpolated(varying_nrm, bar)));
-        if (material.tangent.empty()) return n;
+        if (!material.tangent) return n;
         // Darboux frame (i, j, n): i is the direction across n in which u grows, at a right angle to the one along the
         // face in which u stays the same; j that of v. Found one by one, because a mirrored texture turns one of them
         // round. No frame where uv do not span a plane.
@@ -132,7 +132,7 @@ struct PhongShader final : IShader {
         const real side = select(dot(cross(normalized(e1), normalized(e2)), n) < 0, -1, 1);  // of the face that n is on
         const vec<3, real> i = normalized(cross(normalized(e2 * du.x - e1 * du.y), n)) * side;
         const vec<3, real> j = normalized(cross(normalized(e2 * dv.x - e1 * dv.y), n)) * side;
-        const vec<3, real> t = Texels(material.tangent, uv).normal();
+        const vec<3, real> t = Texels(*material.tangent, uv).normal();
         return normalized(i * t.x + j * t.y + n * t.z);
     }
 };

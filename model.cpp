@@ -427,8 +427,7 @@ Face measure(const vec3& a, const vec3& b, const vec3& c) {
     // The two edges across from the longest one have the best-conditioned cross product.
     const double squares[] = {dot(edges[0], edges[0]), dot(edges[1], edges[1]), dot(edges[2], edges[2])};
     const std::ptrdiff_t i = std::max_element(squares, squares + 3) - squares;
-    const vec3 longest = edges[i], next = edges[(i + 1) % 3], last = edges[(i + 2) % 3];
-    const vec3 across = cross(next, last);
+    const vec3 across = cross(edges[(i + 1) % 3], edges[(i + 2) % 3]);
     const double area = norm(across);  // twice: the product of any two edges' lengths and the sine between them
 
     // An edge's coordinate is a difference rounded once, a product of two is off by 3 half-units in the last place, and
@@ -436,9 +435,7 @@ Face measure(const vec3& a, const vec3& b, const vec3& c) {
     // lengths, and the whole by less than twice that. So little area may be none.
     if (area <= 4 * epsilon * std::sqrt(squares[(i + 1) % 3] * squares[(i + 2) % 3])) return {};
     Face face{normalized(across)};
-    face.angles[i] = std::atan2(area, -dot(longest, last));
-    face.angles[(i + 1) % 3] = std::atan2(area, -dot(next, longest));
-    face.angles[(i + 2) % 3] = std::numbers::pi - face.angles[i] - face.angles[(i + 1) % 3];
+    for (int k = 0; k < 3; k++) face.angles[k] = std::atan2(area, -dot(edges[k], edges[(k + 2) % 3]));
     return face;
 }
 
@@ -490,7 +487,7 @@ void make_normals(Obj& obj) {
 // ---- materials ----
 
 enum { diffuse_map, normal_map, tangent_map, specular_map, glow_map, map_count, bump_map = map_count };
-constexpr TGAImage Material::*map_members[] = {&Material::diffuse, &Material::normal, &Material::tangent,
+constexpr Map Material::*map_members[] = {&Material::diffuse, &Material::normal, &Material::tangent,
                                                &Material::specular, &Material::glow};
 constexpr const char* map_suffixes[] = {"_diffuse.tga", "_nm.tga", "_nm_tangent.tga", "_spec.tga", "_glow.tga"};
 
@@ -619,7 +616,7 @@ std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, st
 // ---- textures ----
 
 // By path, and of each of the materials that use it: its index, and which map the picture is.
-using Pictures = std::map<std::string, std::vector<std::pair<int, TGAImage Material::*>>>;
+using Pictures = std::map<std::string, std::vector<std::pair<int, Map Material::*>>>;
 
 // Adds what a group of faces needs: from the .mtl, and where that names none, the pictures beside the model.
 void plan_pictures(const fs::path& path, const Model::Group& group, Obj& obj, const MtlMaterial& mtl,
@@ -643,38 +640,20 @@ void plan_pictures(const fs::path& path, const Model::Group& group, Obj& obj, co
                         "no texture coordinates, so no textures");
 }
 
-TGAImage widened(const TGAImage& grey) {
-    TGAImage out(grey.width(), grey.height(), TGAImage::RGB);
-    for (int y = 0; y < grey.height(); y++)
-        for (int x = 0; x < grey.width(); x++) std::fill_n(out.pixel(x, y), 3, *grey.pixel(x, y));
-    return out;
-}
-
 // Decodes each picture once, as many at a time as there are cores, and hands it to the materials. What is thrown is the
 // error of the first bad one in the order of their paths.
-void load_pictures(const Pictures& pictures, const fs::path& obj, std::vector<Material>& materials, Notes& notes) {
-    std::int64_t copied = 0;
+void load_pictures(const Pictures& pictures, std::vector<Material>& materials, Notes& notes) {
     std::deque<std::future<TGAImage>> started;
     auto next = pictures.begin();
     for (const auto& [path, uses] : pictures) {
         for (; next != pictures.end() && started.size() < std::max(1u, std::thread::hardware_concurrency()); next++)
             started.push_back(std::async(TGAImage::read_tga_file, next->first));
-        TGAImage image = started.front().get();
+        const auto picture = std::make_shared<const TGAImage>(started.front().get());
         started.pop_front();
-        const bool is_grey = image.bytespp() == 1;
-        for (std::size_t left = uses.size(); const auto& [material, map] : uses) {
-            left--;
-            if (is_grey && (map == &Material::normal || map == &Material::tangent)) {
+        for (const auto& [material, map] : uses)
+            if (picture->bytespp() == 1 && (map == &Material::normal || map == &Material::tangent))
                 notes.push_back(fs::path(path).filename().string() + " is grey, so no normal map: left out");
-                continue;
-            }
-            const bool widens = is_grey && map != &Material::specular;
-            if (left > 0) copied += std::int64_t{1} * image.width() * image.height() * (widens ? 3 : image.bytespp());
-            if (copied > 1 << 30)
-                throw std::runtime_error(obj.string() +
-                                         ": its materials share pictures that would take more than 1 GiB in copies");
-            materials[material].*map = widens ? widened(image) : left > 0 ? image : std::move(image);
-        }
+            else materials[material].*map = picture;
     }
 }
 
@@ -698,7 +677,7 @@ Model::Model(const fs::path& path, NormalMap wanted) {
         const std::string& name = materials_[g.material].name;
         plan_pictures(path, g, obj, library.at(name), name, wanted, pictures, notes_);
     }
-    load_pictures(pictures, path, materials_, notes_);
+    load_pictures(pictures, materials_, notes_);
 
     std::set<std::string> seen;
     std::erase_if(notes_, [&](const std::string& note) { return !seen.insert(note).second; });
@@ -753,7 +732,7 @@ std::string missing_maps(const std::vector<Model>& models) {
         bool used = false;
         for (const Model& model : models)
             for (const Material& m : model.materials())
-                used = used || !(m.*map_members[map]).empty() || (map == normal_map && !m.tangent.empty());
+                used = used || m.*map_members[map] || (map == normal_map && m.tangent);
         if (!used) names += (names.empty() ? "" : ",") + std::string(name);
     }
     return names;

@@ -7,19 +7,20 @@
 #include "tgaimage.h"
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
-// What a surface is made of. A map that is not there is an empty picture; where one is there the shader uses it.
-// All but the specular map have three or four channels: a grey picture is widened, a grey normal map left out.
+// What a surface is made of. Where a map is there the shader uses it; materials may share one. No normal map is grey.
+using Map = std::shared_ptr<const TGAImage>;
 struct Material {
     std::string name;
-    vec3 Kd{1, 1, 1};   // diffuse reflectance, red green blue in [0,1]; it multiplies the diffuse texel
-    TGAImage diffuse;   // NAME_diffuse.tga or map_Kd
-    TGAImage normal;    // NAME_nm.tga: object space, (r,g,b) = (x,y,z) from [0,255] to [-1,1]
-    TGAImage tangent;   // NAME_nm_tangent.tga, norm or map_Bump: tangent space
-    TGAImage specular;  // NAME_spec.tga or map_Ks: the Phong exponent, first channel
-    TGAImage glow;      // NAME_glow.tga or map_Ke: added after shading
+    vec3 Kd{1, 1, 1};  // diffuse reflectance, red green blue in [0,1]; it multiplies the diffuse texel
+    Map diffuse;       // NAME_diffuse.tga or map_Kd
+    Map normal;        // NAME_nm.tga: object space, (r,g,b) = (x,y,z) from [0,255] to [-1,1]
+    Map tangent;       // NAME_nm_tangent.tga, norm or map_Bump: tangent space
+    Map specular;      // NAME_spec.tga or map_Ks: the Phong exponent, first channel
+    Map glow;          // NAME_glow.tga or map_Ke: added after shading
 };
 
 // Which normal map is wanted where a model has one in object space and one in tangent space: only that one is decoded.
@@ -39,9 +40,9 @@ public:
 
     // Reads an .obj and the textures beside it. Throws std::runtime_error "FILE:LINE: what" (LINE counts from 1),
     // "FILE: what" for a file that cannot be read or has no face, and what TGAImage::read_tga_file throws.
-    // Takes at most 256 times the size of the files and 160 KiB, plus 1 GiB for copies of pictures that materials share
-    // (more is an error). A file must not become shorter while it is read, because it may be mapped. Concave polygons
-    // with more than 1000 corners stay fans, with a note. Textures are decoded where faces have coordinates of them.
+    // Takes at most 256 times the size of the files and 160 KiB. A file must not get shorter while it is read, because
+    // it may be mapped. Concave polygons with more than 1000 corners stay fans, with a note. Textures are decoded where
+    // faces have coordinates of them, each once.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
 
     // What the user may want to know and is no error, one line each without the file's name at its head.

@@ -147,6 +147,7 @@ public:
         for (int i = 0; i < lanes; i++)
             std::memcpy(&bytes[i], first + std::size_t{index[i]} * map.bytespp(), 4);
         bytes_ = pack<std::int32_t>(bytes);
+        if (map.bytespp() == 1) bytes_.p[0] = (bytes_.p[0] & 255) * 0x10101;  // grey
     }
     INLINED real operator[](int channel) const {
         pack<std::int32_t> value;
@@ -159,7 +160,7 @@ public:
     }
 
 private:
-    pack<std::int32_t> bytes_;  // four from the texel on, the first one lowest: up to three may lie beyond the picture
+    pack<std::int32_t> bytes_;  // four from the texel on, the first one lowest: some may belong to its neighbours
 };
 
 // base^exponent for integers from 0 to 255, by repeated squaring: the same product in the same order everywhere, which

@@ -71,7 +71,7 @@ std::string notes(const Model& m) {
     for (const std::string& note : m.notes()) out += note + "\n";
     return out;
 }
-int first(const TGAImage& image) { return image.empty() ? -1 : image.get(0, 0)[0]; }
+int first(const Map& map) { return map ? map->get(0, 0)[0] : -1; }
 
 bool finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
@@ -102,8 +102,7 @@ void check_invariants(const Model& m) {
     CHECK_EQ(face, m.nfaces());
     CHECK_EQ(m.groups().size(), m.materials().size());
     for (const Material& each : m.materials())
-        for (const TGAImage* map : {&each.diffuse, &each.normal, &each.tangent, &each.glow})
-            CHECK(map->empty() || map->bytespp() >= 3);
+        for (const Map& map : {each.normal, each.tangent}) CHECK(!map || map->bytespp() >= 3);
 }
 
 const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -783,8 +782,8 @@ TEST("textures beside the model are found by their suffix, and may be absent; on
     check_invariants(m);
     CHECK_EQ(maps(m), "10 20 -1 40 50");
     CHECK_EQ(notes(m), "");
-    CHECK_EQ(m.materials()[0].diffuse.get(1, 1)[2], 12);
-    CHECK_EQ(m.materials()[0].specular.bytespp(), 1);
+    CHECK_EQ(m.materials()[0].diffuse->get(1, 1)[2], 12);
+    CHECK_EQ(m.materials()[0].specular->bytespp(), 1);
     CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 -1 30 40 50");
     folder.write("m_nm.tga", "no picture");
     CHECK_EQ(maps(Model(obj, NormalMap::tangent)), "10 -1 30 40 50");
@@ -872,36 +871,25 @@ TEST("errors come in a fixed order: the .obj, the .mtl, then the textures by the
     for (int i = 0; i < 50; i++) CHECK_THROWS(Model(folder / "m.obj"), "m_glow.tga: ");
 }
 
-TEST("grey pictures are widened where three channels are read, and are no normal maps") {
+TEST("grey pictures stay as they are, and are no normal maps") {
     const Folder folder;
     for (const char* name : {"m_diffuse.tga", "m_nm.tga", "m_glow.tga", "m_spec.tga"})
         folder.picture(name, 77, TGAImage::GRAYSCALE);
     const Model m(folder.write("m.obj", textured));
     check_invariants(m);
     CHECK_EQ(maps(m), "77 -1 -1 77 77");
-    for (int c = 0; c < 3; c++) CHECK_EQ(m.materials()[0].diffuse.get(1, 0)[c], 77);
-    CHECK_EQ(m.materials()[0].specular.bytespp(), 1);
+    CHECK_EQ(m.materials()[0].diffuse->bytespp(), 1);
     CHECK_EQ(notes(m), "m_nm.tga is grey, so no normal map: left out\n");
 }
 
-TEST("shared pictures are decoded once, and their copies are bounded") {
+TEST("a picture that materials share is decoded once") {
     const Folder folder;
-    folder.picture("m_diffuse.tga", 5, TGAImage::RGBA, 3000);  // 36 MB each
-    std::string mtl, uses;
-    for (int i = 0; i < 40; i++) {
-        mtl += "newmtl " + std::to_string(i) + "\n";
-        uses += "usemtl " + std::to_string(i) + "\nf 1/1 2/2 3/3\n";
-    }
-    folder.write("m.mtl", mtl);
-    folder.write("m.obj", "mtllib m.mtl\n" + square + extras + uses);
-    CHECK_THROWS(Model(folder / "m.obj"),
-                 "m.obj: its materials share pictures that would take more than 1 GiB in copies");
     folder.picture("m_diffuse.tga", 5);
+    folder.write("m.mtl", "newmtl a\nnewmtl b\n");
+    folder.write("m.obj", "mtllib m.mtl\n" + textured + "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n");
     const Model m(folder / "m.obj");
-    CHECK_EQ(m.materials().size(), 40u);
-    bool all = true;
-    for (const Material& each : m.materials()) all = all && maps(each) == "5 -1 -1 -1 -1";
-    CHECK(all);
+    CHECK_EQ(maps(m), "5 -1 -1 -1 -1, 5 -1 -1 -1 -1, 5 -1 -1 -1 -1");
+    CHECK(m.materials()[0].diffuse == m.materials()[2].diffuse);
 }
 
 // ---- fitting ----

@@ -237,10 +237,14 @@ TEST("parallel_for calls each number once, and throws what a call throws") {
     }
 }
 
-TEST("texels: nearest, wrapped, v upwards") {
+TEST("texels: nearest, wrapped, v upwards; grey is grey in all channels") {
     TGAImage map(4, 2, TGAImage::GRAYSCALE);
     for (int i = 0; i < 8; i++) *map.pixel(i % 4, i / 4) = static_cast<std::uint8_t>(i);
-    const auto texel = [&](double u, double v) { return static_cast<int>(Texels(map, wrapped({u, v}))[0][lanes - 1]); };
+    const auto texel = [&](double u, double v) {
+        const Color c = Texels(map, wrapped({u, v})).bgr();
+        CHECK(c[0][0] == c[1][0] && c[0][0] == c[2][0]);
+        return static_cast<int>(c[0][lanes - 1]);
+    };
     CHECK_EQ(texel(0, 0), 0);
     CHECK_EQ(texel(.26, .2), 1);
     CHECK_EQ(texel(.99, .99), 7);
