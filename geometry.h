@@ -50,7 +50,8 @@ struct pack {
     part p[parts];
 
     pack() = default;
-    INLINED pack(double s) { for (part& each : p) each = static_cast<T>(s) - part{}; }
+    template <class S> requires std::is_arithmetic_v<S>
+    INLINED pack(S s) { for (part& each : p) each = static_cast<T>(s) - part{}; }
     INLINED explicit pack(const T (&values)[lanes]) { *this = load(values); }
     INLINED static pack load(const T* from) {
         pack out;
@@ -151,7 +152,7 @@ INLINED bool any(const mask& a) {
     }
 COMPARING(float, <) COMPARING(float, >) COMPARING(float, ==)
 COMPARING(double, <) COMPARING(double, >) COMPARING(double, ==)
-COMPARING(std::int32_t, <) COMPARING(std::int32_t, >)
+COMPARING(std::int32_t, <) COMPARING(std::int32_t, >) COMPARING(std::int64_t, >)
 #undef COMPARING
 
 // a where the mask says yes, b elsewhere. Numbers alone are taken for reals.

@@ -32,11 +32,11 @@ struct Options {  // the lesson's scene; the command line can change each of the
 struct DepthShader final : IShader {  // only the z-buffer is wanted: there is no fragment()
     mat4 uniform_PM;  // Projection*ModelView
 
-    DepthShader(const Model& m, const Camera& camera) : IShader(m, 0, m.nfaces()), uniform_PM(camera.to_clip()) {}
+    DepthShader(const Model& m, const Camera& camera) : IShader(m), uniform_PM(camera.to_clip()) {}
 
-    vec4 vertex(int iface, int nthvert) override {
+    vec4 vertex(int vert) const override {
         // The vertex of the .obj, taken to clip space: draw() applies the Viewport and divides by w.
-        return uniform_PM * point(model.vert(iface, nthvert));
+        return uniform_PM * point(model.vert(vert));
     }
 };
 
@@ -54,52 +54,53 @@ struct Shadow {                    // what the first pass leaves for the second
 struct PhongShader final : IShader {
     const Options& opt;
     const Shadow& shadow;
-    const Material& material;
-    mat4 uniform_M;        // ModelView
-    mat4 uniform_PM;       // Projection*ModelView
-    mat4 uniform_MIT;      // ModelView.invert_transpose(), carries normals where ModelView carries points
-    mat4 uniform_Mshadow;  // from the viewer's screen to the shadow buffer's
-    vec3 uniform_l;        // light vector: towards the light, of length 1
-    vec2 varying_uv[3];    // texture coordinates of a triangle: written by vertex(), read by fragment(), as those below
-    vec3 varying_nrm[3];   // normals of the vertices
-    vec3 varying_eye[3];   // the triangle in eye coordinates, for tangent-space normals
-    vec3 varying_sb[3];    // the triangle in the shadow buffer, for the bias and for exact shadows
+    mat4 uniform_M;            // ModelView
+    mat4 uniform_PM;           // Projection*ModelView
+    mat4 uniform_MIT;          // ModelView.invert_transpose(), carries normals where ModelView carries points
+    mat4 uniform_Mshadow;      // from the viewer's screen to the shadow buffer's
+    vec3 uniform_l;            // light vector: towards the light, of length 1
+    const Material* material;  // the face's: written by varying(), read by fragment(), as what follows
+    vec2 varying_uv[3];        // texture coordinates of a triangle
+    vec3 varying_nrm[3];       // normals of the vertices
+    vec3 varying_eye[3];       // the triangle in eye coordinates, for tangent-space normals
+    vec3 varying_sb[3];        // the triangle in the shadow buffer, for the bias and for exact shadows
 
-    PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m, const Model::Group& group)
-        : IShader(m, group.begin, group.end), opt(o), shadow(s), material(m.materials()[group.material]),
-          uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
+    PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m)
+        : IShader(m), opt(o), shadow(s), uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
           uniform_MIT(invert_transpose(uniform_M).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
           uniform_l(normalized((uniform_M * direction(normalized(opt.light_dir))).xyz())) {}
 
-    vec4 vertex(int iface, int nthvert) override {
+    vec4 vertex(int vert) const override { return uniform_PM * point(model.vert(vert)); }
+
+    void varying(int iface, int nthvert) override {
         const vec3& v = model.vert(iface, nthvert);
+        material = &model.material(iface);
         varying_uv[nthvert] = model.uv(iface, nthvert);
         varying_sb[nthvert] = project(shadow.M * point(v));
-        if (!material.normal)
+        if (!material->normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
-        if (material.tangent) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
-        return uniform_PM * point(v);
+        if (material->tangent) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
     }
 
     Color fragment(const Fragment& f) const override {
         const vec<2, coord> uv = wrapped(interpolated(varying_uv, f.bar));
-        const Color texel = material.diffuse ? Texels(*material.diffuse, uv).bgr() : Color{255, 255, 255};
+        const Color texel = material->diffuse ? Texels(*material->diffuse, uv).bgr() : Color{255, 255, 255};
         const vec<3, real> n = normal(uv, f.bar);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
         const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow, no highlight
         const mask lit = any(facing) ? in_light(f) : false;
         real spec = 0;
-        if (any(facing) && material.specular) {
+        if (any(facing) && material->specular) {
             const vec<3, real> r = n * (2 * dot(n, l)) - l;  // reflected light; the viewer is far off at +z
-            spec = select(facing & (r.z > 0), power(r.z, Texels(*material.specular, uv)[0]), 0);
+            spec = select(facing & (r.z > 0), power(r.z, Texels(*material->specular, uv)[0]), 0);
         }
         const real shadow_factor = .3 + .7 * select(lit, 1, 0);
-        const Color glow = material.glow ? Texels(*material.glow, uv).bgr() : Color{0, 0, 0};
+        const Color glow = material->glow ? Texels(*material->glow, uv).bgr() : Color{0, 0, 0};
         Color c;
         for (int i = 0; i < 3; i++)  // Kd has red first
-            c[i] = 20 + texel[i] * material.Kd[2 - i] * ((1.2 * diff + .6 * spec) * shadow_factor) + glow[i];
+            c[i] = 20 + texel[i] * material->Kd[2 - i] * ((1.2 * diff + .6 * spec) * shadow_factor) + glow[i];
 
         // --draw: when something is wrong, these are the first two things to look at.
         if (opt.draw == Options::Draw::shadow) c = Color{1, 1, 1} * select(facing, select(lit, 255, 0), 128);
@@ -119,10 +120,10 @@ struct PhongShader final : IShader {
     }
 
     vec<3, real> normal(const vec<2, coord>& uv, const vec<3, coord>& bar) const {  // of length 1
-        if (material.normal)
-            return normalized((uniform_MIT * direction(Texels(*material.normal, uv).normal())).xyz());
+        if (material->normal)
+            return normalized((uniform_MIT * direction(Texels(*material->normal, uv).normal())).xyz());
         const vec<3, real> n = normalized(to_real(interpolated(varying_nrm, bar)));
-        if (!material.tangent) return n;
+        if (!material->tangent) return n;
         // Darboux frame (i, j, n): i is the direction across n in which u grows, at a right angle to the one along the
         // face in which u stays the same; j that of v. Found one by one, because a mirrored texture turns one of them
         // round. No frame where uv do not span a plane.
@@ -132,7 +133,7 @@ struct PhongShader final : IShader {
         const real side = select(dot(cross(normalized(e1), normalized(e2)), n) < 0, -1, 1);  // of the face that n is on
         const vec<3, real> i = normalized(cross(normalized(e2 * du.x - e1 * du.y), n)) * side;
         const vec<3, real> j = normalized(cross(normalized(e2 * dv.x - e1 * dv.y), n)) * side;
-        const vec<3, real> t = Texels(*material.tangent, uv).normal();
+        const vec<3, real> t = Texels(*material->tangent, uv).normal();
         return normalized(i * t.x + j * t.y + n * t.z);
     }
 };
@@ -165,8 +166,7 @@ static Counters second_pass(const Options& opt, const std::vector<Model>& models
     const Camera viewer{lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
                         middle_viewport(opt.width, opt.height)};
     std::vector<PhongShader> shaders;
-    for (const Model& model : models)
-        for (const Model::Group& group : model.groups()) shaders.emplace_back(opt, shadow, viewer, model, group);
+    for (const Model& model : models) shaders.emplace_back(opt, shadow, viewer, model);
     return draw(shaders, viewer.Viewport, frame);
 }
 

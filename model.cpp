@@ -685,6 +685,11 @@ Model::Model(const fs::path& path, NormalMap wanted) {
         notes_[20] = "and " + std::to_string(notes_.size() - 20) + " more like these";
         notes_.resize(21);
     }
+    // A vertex that no face uses may be anywhere. It is put where another is, so that all can be measured and moved.
+    std::vector<bool> is_used(obj.verts.size());
+    for (const Corner& c : obj.corners) is_used[c.vert] = true;
+    for (int i = 0; i < count(obj.verts); i++)
+        if (!is_used[i]) obj.verts[i] = obj.verts[obj.corners[0].vert];
     verts_ = std::move(obj.verts);
     normals_ = std::move(obj.normals);
     uvs_ = std::move(obj.uvs);
@@ -692,13 +697,10 @@ Model::Model(const fs::path& path, NormalMap wanted) {
 }
 
 bool Model::fit() {
-    if (corners_.empty()) return false;
-    vec3 low = vert(0, 0), high = low;
-    for (const Corner& c : corners_)
-        for (int i = 0; i < 3; i++) {
-            low[i] = std::min(low[i], verts_[c.vert][i]);
-            high[i] = std::max(high[i], verts_[c.vert][i]);
-        }
+    if (verts_.empty()) return false;
+    vec3 low = verts_[0], high = low;
+    for (const vec3& v : verts_)
+        for (int i = 0; i < 3; i++) low[i] = std::min(low[i], v[i]), high[i] = std::max(high[i], v[i]);
     const double extent = std::max(largest(low), largest(high));
     constexpr double pixel = 2 / (.75 * 16384);  // [-1,1] are three quarters of a picture's side
     const bool invisible = largest(high - low) < pixel && !(low == high);
@@ -714,7 +716,6 @@ bool Model::fit() {
         v = v * unit;
         v = (v - low) - (high - v);  // twice the way from the centre, which itself may be no double
         if (side > 0) v = v / side;
-        for (int i = 0; i < 3; i++) v[i] = std::clamp(v[i], -1., 1.);  // what no face uses may be anywhere
     }
     notes_.push_back("fitted to [-1,1]^3");
     return true;

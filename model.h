@@ -6,6 +6,7 @@
 #include "geometry.h"
 #include "tgaimage.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -45,6 +46,11 @@ public:
     // faces have coordinates of them, each once.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
 
+    // Made in memory: three corners a face. It has one material, without maps.
+    Model(std::vector<vec3> verts, std::vector<vec2> uvs, std::vector<vec3> normals, std::vector<Corner> corners)
+        : verts_(std::move(verts)), normals_(std::move(normals)), uvs_(std::move(uvs)), corners_(std::move(corners)),
+          materials_(1), groups_{{0, nfaces(), 0}} {}
+
     // What the user may want to know and is no error, one line each without the file's name at its head.
     const std::vector<std::string>& notes() const { return notes_; }
 
@@ -52,6 +58,7 @@ public:
     int nfaces() const { return static_cast<int>(corners_.size() / 3); }
     const Corner& corner(int face, int c) const { return corners_[std::size_t{3} * face + c]; }
     const std::vector<vec3>& verts() const { return verts_; }
+    const vec3& vert(int i) const { return verts_[i]; }
     const vec3& vert(int face, int c) const { return verts_[corner(face, c).vert]; }
     const vec3& normal(int face, int c) const { return normals_[corner(face, c).normal]; }  // unit
     vec2 uv(int face, int c) const {  // (0,0) where the file gives none; v points up
@@ -61,6 +68,10 @@ public:
 
     const std::vector<Material>& materials() const { return materials_; }
     const std::vector<Group>& groups() const { return groups_; }
+    const Material& material(int face) const {
+        const auto ends_before = [](int f, const Group& g) { return f < g.end; };
+        return materials_[std::upper_bound(groups_.begin(), groups_.end(), face, ends_before)->material];
+    }
 
     // Moves the centre of the bounding box of the used vertices to the origin and scales uniformly so that its largest
     // half-side is 1, if the box is not within [-1,1]^3 already or is smaller than a pixel of the largest picture.

@@ -46,8 +46,8 @@ Camera fitted(const Camera& camera, const std::vector<Model>& models, int size) 
     Camera result{camera.ModelView, mat4::identity(), viewport(0, 0, size, size)};
     vec3 low{inf, inf, inf}, high{-inf, -inf, -inf};
     for (const Model& model : models) {
-        for (int corner = 0; corner < model.nfaces() * 3; corner++) {
-            const vec3 p = (camera.ModelView * point(model.vert(corner / 3, corner % 3))).xyz();
+        for (const vec3& v : model.verts()) {
+            const vec3 p = (camera.ModelView * point(v)).xyz();
             for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
         }
     }
@@ -293,10 +293,8 @@ int clip(const Screen& s, int width, int height, Point (&corners)[most_corners])
     return n;
 }
 
-// What a face covers: a convex polygon of n snapped corners, the pixels whose centres lie in its box, and its depth,
-// which is linear on the screen.
+// The pixels whose centres lie in the box of a face, and its depth, which is linear on the screen.
 struct Coverage {
-    int n, first;  // the corners, in a list of many
     int xmin, xmax, ymin, ymax;
     double zx, zy, z0;   // depth = zx (x - xmin) + zy (y - ymin) + z0 at the centre of the pixel (x,y) ...
     double zmin, zmax;   // ... and no smaller or larger than those of its corners
@@ -305,7 +303,6 @@ struct Coverage {
 // The box and the range of depths of a polygon; false where it covers no pixel's centre.
 bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
     constexpr std::int32_t half = 1 << (subpixel_bits - 1);
-    c.n = n;
     Point low = corners[0], high = low;
     for (int i = 1; i < n; i++) {
         const Point& p = corners[i];
@@ -358,84 +355,92 @@ Barycentric planes(Screen s, Coverage& c) {
     const double z_r = p[r].z / p[r].w;
     vec3 z{p[0].z - z_r * p[0].w, p[1].z - z_r * p[1].w, p[2].z - z_r * p[2].w};
     z[r] = 0;
-    c.zx = dot(z, b.ex) / std::fabs(det);
-    c.zy = dot(z, b.ey) / std::fabs(det);
-    c.z0 = z_r + dot(z, b.e0) / std::fabs(det);
+    const double share = 1 / std::fabs(det);
+    c.zx = dot(z, b.ex) * share;
+    c.zy = dot(z, b.ey) * share;
+    c.z0 = z_r + dot(z, b.e0) * share;
     return b;
 }
 
 // ---- the pixels of a face ----
 
-// Calls visit(y, x_begin, x_end) for the pixels on the rows [y_begin, y_end) of the triangle of the corners 0, k-1 and
-// k. The edge function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies
-// on the edge and belongs to it if the edge is a left one (it runs down, counter-clockwise) or a top one (it runs
-// left), so that of two triangles sharing an edge exactly one owns the pixel. Range: with max_size pixels and the guard
-// band, differences of coordinates are below 2^30.6, edge functions below 2^62.2.
-//
-// Along a row an edge function grows by the same step from pixel to pixel. How often the step goes into it is where it
-// changes its sign; from row to row that grows by a quotient and a remainder, as in Bresenham's lines.
+const pack<std::int32_t> lane_numbers = [] {
+    std::int32_t numbers[lanes];
+    for (int i = 0; i < lanes; i++) numbers[i] = i;
+    return pack<std::int32_t>(numbers);
+}();
+
+// The edge function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies on
+// the edge and belongs to it if the edge is a left one (it runs down) or a top one (it runs left), so that of two
+// triangles sharing an edge exactly one owns the pixel. With max_size pixels and the guard band, differences of
+// coordinates are below 2^30.6 and edge functions below 2^62.2. From pixel to pixel they change by multiples of
+// 2^subpixel_bits: the bits below decide nothing and are cut off.
+struct Edge {
+    std::int64_t first, right, up;  // the function at the centre of the first pixel, and its steps from pixel to pixel
+};
+
+// Calls visit(x0, y, inside) for the pixels of a triangle on the rows [y_begin, y_end): x0 is a multiple of lanes,
+// inside says which of the pixels from there on. The edges' first pixel is (c.xmin / lanes * lanes, y_begin). Returns
+// how many pixels are inside. This one asks at every pixel of the box, and takes less time for small ones.
 template <class Visit>
-void for_each_span_of_fan(const Coverage& c, const Point* corners, int k, int y_begin, int y_end, Visit&& visit) {
-    using wide = std::int64_t;
-    constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
-    const Point &a = corners[0], &b = corners[k - 1], &d = corners[k];
-    const wide area = (wide{b.x} - a.x) * (wide{d.y} - a.y) - (wide{b.y} - a.y) * (wide{d.x} - a.x);
-    if (area == 0) return;
-    const Point* const corner[3] = {&a, area < 0 ? &d : &b, area < 0 ? &b : &d};
-    struct Edge {
-        wide step, divisor, times, rest, more_times, more_rest;
-    } edges[3];
+INLINED long for_each_in_box(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end, Visit&& visit) {
+    using Lanes = pack<std::int32_t>;
+    Lanes row[3], right[3], up[3], inside_in_all = 0;
     for (int i = 0; i < 3; i++) {
-        const Point &p = *corner[i], &q = *corner[(i + 1) % 3];
-        const wide dx = wide{q.x} - p.x, dy = wide{q.y} - p.y;
-        const bool top_left = dy < 0 || (dy == 0 && dx < 0);
-        const wide first = dx * (y_begin * one + half - p.y) - dy * (c.xmin * one + half - p.x) - (top_left ? 0 : 1);
-        Edge& e = edges[i];
-        e.step = -dy * one;
-        e.divisor = e.step ? std::abs(e.step) : 1;
-        const auto divide = [&e](wide n, wide& quotient, wide& remainder) {  // rounded down
+        const auto step = static_cast<std::int32_t>(edges[i].right);
+        row[i] = lane_numbers * step + static_cast<std::int32_t>(edges[i].first);
+        right[i] = step * lanes, up[i] = static_cast<std::int32_t>(edges[i].up);
+    }
+    for (int y = y_begin; y < y_end; y++) {
+        Lanes e[3] = {row[0], row[1], row[2]};
+        for (int x0 = c.xmin / lanes * lanes; x0 <= c.xmax; x0 += lanes) {
+            const mask inside = (min(min(e[0], e[1]), e[2]) > -1) & (lane_numbers < c.xmax + 1 - x0);
+            if (any(inside)) visit(x0, y, inside);
+            inside_in_all = inside_in_all + select(inside, Lanes(1), 0);
+            for (int i = 0; i < 3; i++) e[i] = e[i] + right[i];
+        }
+        for (int i = 0; i < 3; i++) row[i] = row[i] + up[i];
+    }
+    long sum = 0;
+    for (int i = 0; i < lanes; i++) sum += inside_in_all[i];
+    return sum;
+}
+
+// The same for a triangle of any size. How often the step along a row goes into an edge function is where that changes
+// its sign; from row to row it grows by a quotient and a remainder, as in Bresenham's lines.
+template <class Visit>
+INLINED long for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end, Visit&& visit) {
+    struct Crossing {
+        std::int64_t divisor, times, rest, more_times, more_rest;
+    } crossings[3];
+    for (int i = 0; i < 3; i++) {
+        Crossing& e = crossings[i];
+        e.divisor = edges[i].right ? std::abs(edges[i].right) : 1;
+        const auto divide = [&e](std::int64_t n, std::int64_t& quotient, std::int64_t& remainder) {  // rounded down
             quotient = n / e.divisor, remainder = n % e.divisor;
             if (remainder < 0) quotient--, remainder += e.divisor;
         };
-        divide(first, e.times, e.rest);
-        divide(dx * one, e.more_times, e.more_rest);
+        divide(edges[i].first, e.times, e.rest);
+        divide(edges[i].up, e.more_times, e.more_rest);
     }
+    const int x_first = c.xmin / lanes * lanes;
+    long sum = 0;
     for (int y = y_begin; y < y_end; y++) {
-        wide first = 0, last = c.xmax - c.xmin;
-        for (Edge& e : edges) {
-            if (e.step > 0) first = std::max(first, -e.times);
-            else if (e.step < 0) last = std::min(last, e.times);
-            else if (e.times < 0) last = -1;
+        std::int64_t begin = 0, end = c.xmax + 1 - x_first;
+        for (int i = 0; i < 3; i++) {
+            Crossing& e = crossings[i];
+            if (edges[i].right > 0) begin = std::max(begin, -e.times);
+            else if (edges[i].right < 0) end = std::min(end, e.times + 1);
+            else if (e.times < 0) end = 0;
             e.times += e.more_times, e.rest += e.more_rest;
             if (e.rest >= e.divisor) e.times++, e.rest -= e.divisor;
         }
-        if (first <= last) visit(y, c.xmin + static_cast<int>(first), c.xmin + static_cast<int>(last) + 1);
+        if (begin >= end) continue;
+        sum += static_cast<long>(end - begin);
+        for (auto x = static_cast<int>(begin) / lanes * lanes; x < end; x += lanes)
+            visit(x_first + x, y, (lane_numbers > begin - x - 1) & (lane_numbers < end - x));
     }
-}
-
-// Calls visit(y, x_begin, x_end) for the pixels of a face on the rows [y_begin, y_end), each once. The polygon is a fan
-// of triangles; nearly always there is one.
-template <class Visit>
-void for_each_span(const Coverage& c, const Point* corners, int y_begin, int y_end, Visit&& visit) {
-    y_begin = std::max(y_begin, c.ymin);
-    y_end = std::min(y_end, c.ymax + 1);
-    if (c.n == 3) return for_each_span_of_fan(c, corners, 2, y_begin, y_end, visit);
-    // Snapping and clipping round: a cut polygon may be convex but for a hair, and then its fan overlaps itself.
-    for (int y = y_begin; y < y_end; y++) {
-        std::pair<int, int> spans[most_corners];
-        int n = 0;
-        for (int k = 2; k < c.n; k++)
-            for_each_span_of_fan(c, corners, k, y, y + 1, [&](int, int begin, int end) {
-                int i = n++;  // from left to right
-                for (; i > 0 && spans[i - 1].first > begin; i--) spans[i] = spans[i - 1];
-                spans[i] = {begin, end};
-            });
-        for (int i = 0; i < n;) {
-            auto [begin, end] = spans[i++];
-            for (; i < n && spans[i].first <= end; i++) end = std::max(end, spans[i].second);
-            visit(y, begin, end);
-        }
-    }
+    return sum;
 }
 
 // ---- drawing ----
@@ -444,26 +449,24 @@ struct Face : Coverage {
     int shader, iface, number;
 };
 
-// A vertex on the screen, homogeneous; where clipping leaves it alone also snapped.
+// A vertex on the screen: homogeneous, and snapped; point.x is to_be_clipped where it is not within the guard band.
 struct Vertex {
-    int number = -1;
     vec4 screen;
-    bool inside;
     Point point;
 };
+constexpr std::int32_t to_be_clipped = INT32_MIN;
 
-// Some consecutive faces, prepared by one thread.
+// Some consecutive faces, looked at by one thread.
 struct Block {
-    std::vector<Face> faces;
-    std::vector<Point> corners;
-    std::vector<int> first, touching;  // the faces that touch the strip s: touching[first[s]] to touching[first[s + 1]]
+    std::vector<std::vector<int>> touching;  // the numbers of those that touch a strip
     Counters count;
 };
 
-// What a thread needs for a strip, kept from one to the next.
+// What a thread needs for a strip.
 struct Workspace {
     std::vector<float> depth;
-    std::vector<std::int32_t> nearest;  // the mark of the face that is nearest at each pixel, -1 for none
+    std::vector<std::int32_t> nearest;  // which of the faces is nearest at each pixel, -1 for none
+    std::vector<Face> faces;
     Counters count;
 };
 
@@ -479,7 +482,12 @@ struct Pass {
     // faces in their order. A strip's depths and marks, 8 bytes a pixel, fit into the cache of a core.
     const int strip_rows = std::clamp(32768 / width, 8, 64), strips = (height + strip_rows - 1) / strip_rows;
     const int stride = (width + lanes - 1) / lanes * lanes;  // a row is as long as a whole number of lanes
+    std::vector<int> first_face{0};  // of each shader, among all
+    std::vector<int> first_vertex{0};
+    std::vector<const Model*> models{};
+    std::vector<Vertex>& vertices = kept<Vertex>();
     std::vector<Block>& blocks = kept<Block>();
+    std::vector<Workspace>& spaces = kept<Workspace>();
 
     // The memory of the last pass: on 160 000 faces to touch fresh one costs a sixth of the time.
     template <class T>
@@ -489,130 +497,152 @@ struct Pass {
     }
 
     Counters draw() {
-        std::vector<int> first{0};  // the number of each shader's first face
-        for (int i = 0; i < nshaders; i++) first.push_back(first[i] + shader(i, 0).end - shader(i, 0).begin);
-        // A thread gets several blocks, in case that some take longer than others; none is worth fewer than 64 faces.
-        const std::int64_t faces = first.back(), n = std::clamp<std::int64_t>(faces / 64, 1, 8 * thread_count());
-        blocks.resize(n);
-        for (Block& b : blocks) b.faces.clear(), b.corners.clear(), b.count = {};
-        parallel_for(static_cast<int>(n), [&](int b, int thread) {
-            std::vector<Vertex> last(1024);
-            for (auto number = static_cast<int>(faces * b / n), s = 0; number < faces * (b + 1) / n; number++) {
-                while (number >= first[s + 1]) s++, last.assign(last.size(), {});
-                const int iface = shader(s, thread).begin + number - first[s];
-                prepare(shader(s, thread), {{}, s, iface, number}, last, blocks[b]);
-            }
-            sort_into_strips(blocks[b]);
+        for (int i = 0; i < nshaders; i++) {
+            const Model& model = *models.emplace_back(&shader(i, 0).model);
+            first_face.push_back(first_face[i] + model.nfaces());
+            first_vertex.push_back(first_vertex[i] + model.nverts());
+        }
+        vertices.resize(first_vertex.back());
+        in_parts(first_vertex, [this](int, int s, int begin, int end, int thread) {
+            const IShader& own = shader(s, thread);
+            for (int i = begin; i < end; i++) vertices[first_vertex[s] + i] = placed(Viewport * own.vertex(i));
         });
-        std::vector<Workspace>& spaces = kept<Workspace>();
+        blocks.resize(parts(first_face));
+        for (Block& b : blocks) {
+            b.touching.resize(strips), b.count = {};
+            for (std::vector<int>& faces : b.touching) faces.clear();
+        }
+        in_parts(first_face, [this](int part, int s, int begin, int end, int) {
+            for (int i = begin; i < end; i++) sort_into_strips({{}, s, i, first_face[s] + i}, blocks[part]);
+        });
         spaces.resize(thread_count());
         for (Workspace& w : spaces) w.count = {};
-        parallel_for(strips, [&](int strip, int thread) { draw_strip(strip, thread, spaces[thread]); });
+        parallel_for(strips, [this](int strip, int thread) { draw_strip(strip, thread); });
         Counters total;
         for (const Block& b : blocks) total += b.count;
         for (const Workspace& w : spaces) total += w.count;
         return total;
     }
 
-    // The corner of a face, from those that were asked for last if it is there: neighbouring faces share their
-    // vertices.
-    const Vertex& vertex(IShader& own, int iface, int nthvert, std::vector<Vertex>& last) const {
-        const int number = own.vertex_number(iface, nthvert);
-        Vertex& v = last[number % last.size()];
-        if (v.number != number) {
-            v.number = number;
-            v.screen = Viewport * own.vertex(iface, nthvert);
-            const vec4& s = v.screen;
-            v.inside = s.w >= w_near && s.x >= -guard * s.w && s.x <= (width + guard) * s.w && s.y >= -guard * s.w &&
-                       s.y <= (height + guard) * s.w && s.w <= 0x1p1000 && std::isfinite(s.z);
-            if (v.inside) v.point = snapped(s, width, height);
-        }
-        return v;
+    // Vertices or faces are dealt out in parts of consecutive ones. A thread gets several, in case that some take
+    // longer than others; none is worth fewer than 64.
+    static int parts(const std::vector<int>& first) { return std::clamp(first.back() / 64, 1, 8 * thread_count()); }
+    template <class Work>
+    static void in_parts(const std::vector<int>& first, Work&& work) {
+        const int n = parts(first);
+        const auto begin_of = [&](int part) { return static_cast<int>(std::int64_t{first.back()} * part / n); };
+        parallel_for(n, [&](int part, int thread) {
+            int begin = begin_of(part), end = begin_of(part + 1);
+            for (int s = shader_of(begin, first); begin < end; begin = first[++s])
+                work(part, s, begin - first[s], std::min(end, first[s + 1]) - first[s], thread);
+        });
+    }
+    static int shader_of(int i, const std::vector<int>& first) {
+        return static_cast<int>(std::upper_bound(first.begin(), first.end(), i) - first.begin()) - 1;
     }
 
-    void prepare(IShader& own, Face face, std::vector<Vertex>& last, Block& block) const {
-        Screen screen;
-        Point corners[most_corners];
+    Vertex placed(const vec4& s) const {
+        const bool inside = s.w >= w_near && s.x >= -guard * s.w && s.x <= (width + guard) * s.w &&
+                            s.y >= -guard * s.w && s.y <= (height + guard) * s.w && s.w <= 0x1p100 &&
+                            std::fabs(s.z) <= 0x1p100;
+        return {s, inside ? snapped(s, width, height) : Point{to_be_clipped, 0, 0}};
+    }
+
+    // The corners of a face, homogeneous and those of what is left of it after clipping. Returns how many these are.
+    int corners_of(const Face& face, Screen& screen, Point (&corners)[most_corners]) const {
+        const Vertex* const all = &vertices[first_vertex[face.shader]];
         bool inside = true;
         for (int i = 0; i < 3; i++) {
-            const Vertex& v = vertex(own, face.iface, i, last);
+            const Vertex& v = all[models[face.shader]->corner(face.iface, i).vert];
             screen.corner[i] = v.screen, corners[i] = v.point;
-            inside = inside && v.inside;
+            inside = inside && v.point.x != to_be_clipped;
         }
+        screen.size = 1;
+        if (inside) return 3;
+        return measure(screen) && !is_outside(screen, width, height) ? clip(screen, width, height, corners) : 0;
+    }
+
+    void sort_into_strips(const Face& face, Block& block) const {
+        Screen screen;
+        Point corners[most_corners];
+        Coverage c;
+        const int n = corners_of(face, screen, corners);
         block.count.triangles++;
-        const bool somewhere = measure(screen) && !is_outside(screen, width, height);
-        const int n = !somewhere ? 0 : inside ? 3 : clip(screen, width, height, corners);
         if (n == 0) block.count.outside++;
-        else if (!bound(corners, n, width, height, face)) block.count.between_samples++;
-        else {
-            planes(screen, face);
-            face.first = static_cast<int>(block.corners.size());
-            block.corners.insert(block.corners.end(), corners, corners + n);
-            block.faces.push_back(face);
-        }
+        else if (!bound(corners, n, width, height, c)) block.count.between_samples++;
+        else for (int s = c.ymin / strip_rows; s <= c.ymax / strip_rows; s++) block.touching[s].push_back(face.number);
     }
 
-    void sort_into_strips(Block& b) const {
-        b.first.assign(strips + 2, 0);
-        const auto for_each_touch = [&](auto&& visit) {
-            for (int i = 0; i < static_cast<int>(b.faces.size()); i++)
-                for (int s = b.faces[i].ymin / strip_rows; s <= b.faces[i].ymax / strip_rows; s++) visit(s, i);
-        };
-        for_each_touch([&](int s, int) { b.first[s + 2]++; });
-        for (int s = 0; s < strips; s++) b.first[s + 2] += b.first[s + 1];
-        b.touching.resize(b.first[strips + 1]);
-        for_each_touch([&](int s, int i) { b.touching[b.first[s + 1]++] = i; });
-    }
-
-    void draw_strip(int strip, int thread, Workspace& w) const {
+    void draw_strip(int strip, int thread) const {
+        Workspace& w = spaces[thread];
         const int y_begin = strip * strip_rows, y_end = std::min(y_begin + strip_rows, height);
         const int cells = stride * (y_end - y_begin);
         float* depth = zbuffer ? zbuffer->row(y_begin) : (w.depth.resize(cells), w.depth.data());
         std::fill_n(depth, cells, DepthBuffer::nothing);
-        if (picture) w.nearest.assign(cells, -1);
-        const auto for_each_face = [&](auto&& visit) {
-            int mark = 0;
-            for (const Block& b : blocks)
-                for (int i = b.first[strip]; i < b.first[strip + 1]; i++) visit(b, b.faces[b.touching[i]], mark++);
-        };
-        for_each_face([&](const Block& b, const Face& face, int mark) {
-            w.count.covered += triangle(face, &b.corners[face.first], mark, y_begin, y_end, depth,
-                                        picture ? w.nearest.data() : nullptr);
-        });
+        if (picture) w.nearest.assign(cells, -1), w.faces.clear();
+        for (const Block& b : blocks)
+            for (const int number : b.touching[strip]) {
+                const int s = shader_of(number, first_face);
+                Face face{{}, s, number - first_face[s], number};
+                Screen screen;
+                Point corners[most_corners];
+                const int n = corners_of(face, screen, corners);
+                bound(corners, n, width, height, face);
+                planes(screen, face);
+                for (int k = 2; k < n; k++)  // what has been cut is a fan of triangles
+                    w.count.covered += triangle(face, corners[0], corners[k - 1], corners[k], y_begin, y_end, depth, w);
+                if (picture) w.faces.push_back(face);
+            }
         if (!picture) return;
         std::memset(picture->pixel(0, y_begin), 0, std::size_t{1} * picture->bytespp() * width * (y_end - y_begin));
-        for_each_face([&](const Block&, const Face& face, int mark) {
-            w.count.shaded += shade(face, mark, shader(face.shader, thread), y_begin, y_end, w.nearest.data());
-        });
+        for (int mark = 0; mark < static_cast<int>(w.faces.size()); mark++)
+            w.count.shaded += shade(mark, thread, y_begin, y_end);
     }
 
-    // Draws a face into the rows of a strip; where it is nearest, nearest (if given) gets its mark. Returns the number
-    // of samples.
-    long triangle(const Face& face, const Point* corners, int mark, int y_begin, int y_end, float* depth,
-                  std::int32_t* nearest) const {
-        std::int32_t numbers[lanes];
-        for (int i = 0; i < lanes; i++) numbers[i] = i;
-        const pack<std::int32_t> lane(numbers), marks(mark);
+    // Draws a triangle of a face into the rows of a strip. Returns the number of samples.
+    long triangle(const Face& face, const Point& a, const Point& b, const Point& c, int y_begin, int y_end,
+                  float* depth, Workspace& w) const {
+        using wide = std::int64_t;
+        constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
+        const wide area = (wide{b.x} - a.x) * (wide{c.y} - a.y) - (wide{b.y} - a.y) * (wide{c.x} - a.x);
+        if (area == 0) return 0;
+        const Point* const corner[] = {&a, area < 0 ? &c : &b, area < 0 ? &b : &c, &a};  // counterclockwise
+        const int y_first = std::max(y_begin, face.ymin), y_last = std::min(y_end, face.ymax + 1) - 1;
+        const wide first_x = face.xmin / lanes * lanes * one + half, first_y = y_first * one + half;
+        Edge edges[3];
+        wide farthest = 0;  // of a corner from the first pixel, along x or y
+        for (int i = 0; i < 3; i++) {
+            const Point &p = *corner[i], &q = *corner[i + 1];
+            const wide dx = wide{q.x} - p.x, dy = wide{q.y} - p.y;
+            const bool top_left = dy < 0 || (dy == 0 && dx < 0);
+            edges[i] = {(dx * (first_y - p.y) - dy * (first_x - p.x) - !top_left) >> subpixel_bits, -dy, dx};
+            farthest = std::max({farthest, std::abs(p.x - first_x), std::abs(p.y - first_y)});
+        }
+
         const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
-        long covered = 0;
-        for_each_span(face, corners, y_begin, y_end, [&](int y, int x_begin, int x_end) {
+        const pack<std::int32_t> mark(static_cast<int>(w.faces.size()));
+        const auto visit = [&](int x0, int y, const mask& inside) {
             const coord z_row = face.zy * (y - face.ymin) + face.z0;
-            covered += x_end - x_begin;
-            for (int x0 = x_begin / lanes * lanes; x0 < x_end; x0 += lanes) {
-                const std::ptrdiff_t at = std::ptrdiff_t{stride} * (y - y_begin) + x0;
-                const real z = to_real(min(max(zx * to_coord(lane + (x0 - face.xmin)) + z_row, zmin), zmax));
-                const real old = real::load(depth + at);
-                const mask nearer = (z > old) & (lane > x_begin - x0 - 1) & (lane < x_end - x0);
-                select(nearer, z, old).store(depth + at);
-                if (nearest) select(nearer, marks, pack<std::int32_t>::load(nearest + at)).store(nearest + at);
-            }
-        });
-        return covered;
+            const std::ptrdiff_t at = std::ptrdiff_t{stride} * (y - y_begin) + x0;
+            const real z = to_real(min(max(zx * to_coord(lane_numbers + (x0 - face.xmin)) + z_row, zmin), zmax));
+            const real old = real::load(depth + at);
+            const mask nearer = (z > old) & inside;
+            select(nearer, z, old).store(depth + at);
+            if (picture) select(nearer, mark, pack<std::int32_t>::load(&w.nearest[at])).store(&w.nearest[at]);
+        };
+        // Then dx and dy are below 120 pixels and no corner is more than 124 from a pixel of the box: two products, without
+        // the bits that are cut off, add up to less than 2 * 120 * 124 * 2^16 < 2^31.
+        if (farthest < 60 * one && face.xmax - face.xmin < 4 * lanes)
+            return for_each_in_box(face, edges, y_first, y_last + 1, visit);
+        return for_each_in_spans(face, edges, y_first, y_last + 1, visit);
     }
 
-    // Colours those pixels of a strip that have the face's mark, as many at once as there are lanes. Returns their
+    // Colours those pixels of a strip that have the mark of a face, as many at once as there are lanes. Returns their
     // number.
-    long shade(const Face& face, int mark, IShader& own, int y_begin, int y_end, const std::int32_t* nearest) const {
+    long shade(int mark, int thread, int y_begin, int y_end) const {
+        const Workspace& w = spaces[thread];
+        const Face& face = w.faces[mark];
+        IShader& own = shader(face.shader, thread);
         constexpr int most = 32 * lanes;  // pixels that are collected before they are coloured
         std::int32_t xs[most], ys[most];
         int n = 0;
@@ -626,7 +656,7 @@ struct Pass {
             n = 0;
         };
         for (int y = std::max(y_begin, face.ymin); y < std::min(y_end, face.ymax + 1); y++) {
-            const std::int32_t* const row = nearest + std::ptrdiff_t{stride} * (y - y_begin);
+            const std::int32_t* const row = &w.nearest[std::ptrdiff_t{stride} * (y - y_begin)];
             for (int x = face.xmin; x <= face.xmax; x++) {
                 xs[n] = x, ys[n] = y;
                 n += row[x] == mark;  // no branch: it would be guessed wrong at both ends of a row
@@ -640,8 +670,9 @@ struct Pass {
     // Makes the shader write the varyings of a face.
     Barycentric start(const Face& face, IShader& own) const {
         Screen screen;
-        for (int i = 0; i < 3; i++) screen.corner[i] = Viewport * own.vertex(face.iface, i);
-        measure(screen);
+        Point corners[most_corners];
+        for (int i = 0; i < 3; i++) own.varying(face.iface, i);
+        corners_of(face, screen, corners);
         Coverage c = face;
         return planes(screen, c);
     }

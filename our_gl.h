@@ -102,19 +102,17 @@ struct Fragment {
 
 using Color = vec<3, real>;  // a TGAColor in each lane: blue, green, red from 0 up; what is above 255 is drawn as 255
 
-// What a shader computes is written into its members: a uniform is the same for a whole pass, a varying is written for
-// each corner of a face by vertex() and read by fragment(). Each thread draws with a copy of its own.
+// A uniform is the same for a whole pass. A varying is written for each corner of a face, and fragment() reads it. Each
+// thread draws with a copy of its own.
 struct IShader {
     const Model& model;
-    const int begin, end;  // the faces that it draws, of its model
     virtual ~IShader() = default;
-    virtual vec4 vertex(int iface, int nthvert) = 0;  // the corner in clip space; nthvert 0, 1, 2
-    // Corners with the same number are at the same place: vertex() is asked for it once.
-    virtual int vertex_number(int iface, int nthvert) const { return model.corner(iface, nthvert).vert; }
+    virtual vec4 vertex(int vert) const = 0;                 // where a vertex of the model is, in clip space
+    virtual void varying(int /*iface*/, int /*nthvert*/) {}  // the rest of a corner, of faces that are seen alone
     virtual Color fragment(const Fragment&) const { return {}; }  // not called where depth alone is wanted
 
 protected:
-    IShader(const Model& m, int begin_, int end_) : model(m), begin(begin_), end(end_) {}
+    explicit IShader(const Model& m) : model(m) {}
     IShader(const IShader&) = default;
 };
 

@@ -4,14 +4,16 @@
 
 // Three corners a face. A pixel gets the number of its face, from 1 on, as b + 256 g + 65536 r.
 struct ClipShader : IShader {
+    std::shared_ptr<const Model> own;
     const std::vector<vec4>& clip;
-    explicit ClipShader(const std::vector<vec4>& c) : IShader(no_model(), 0, static_cast<int>(c.size() / 3)), clip(c) {}
-    static const Model& no_model() {
-        static const Model none;
-        return none;
+    explicit ClipShader(const std::vector<vec4>& c) : ClipShader(c, std::make_shared<Model>(faces(c.size()))) {}
+    ClipShader(const std::vector<vec4>& c, std::shared_ptr<const Model> m) : IShader(*m), own(m), clip(c) {}
+    static Model faces(std::size_t corners) {
+        std::vector<Model::Corner> c;
+        for (int i = 0; i < static_cast<int>(corners); i++) c.push_back({i, -1, 0});
+        return {std::vector<vec3>(corners), {}, {{0, 0, 1}}, c};
     }
-    int vertex_number(int iface, int nthvert) const override { return iface * 3 + nthvert; }
-    vec4 vertex(int iface, int nthvert) override { return clip[iface * 3 + nthvert]; }
+    vec4 vertex(int vert) const override { return clip[vert]; }
     Color fragment(const Fragment& f) const override {
         const int n = f.face + 1;
         return {n & 255, n >> 8 & 255, n >> 16};
