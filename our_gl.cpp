@@ -176,9 +176,30 @@ void parallel_for(int n, const std::function<void(int, int)>& work) {
     pool->run(n, work);
 }
 
-// ---- a face on the screen ----
-
 namespace {
+
+// The vertices or the faces of several models, numbered through: first[m] is the first of model m, first.back() their
+// count. They are dealt out in parts of consecutive ones. A thread gets several, in case that some take longer than
+// others; none is worth fewer than 64.
+int parts(const std::vector<int>& first) { return std::clamp(first.back() / 64, 1, 8 * thread_count()); }
+
+int model_of(int i, const std::vector<int>& first) {
+    return static_cast<int>(std::upper_bound(first.begin(), first.end(), i) - first.begin()) - 1;
+}
+
+// Calls work(part, m, begin, end, thread) for [begin,end) of model m, which belongs to a part.
+template <class Work>
+void in_parts(const std::vector<int>& first, Work&& work) {
+    const int n = parts(first);
+    const auto begin_of = [&](int part) { return static_cast<int>(std::int64_t{first.back()} * part / n); };
+    parallel_for(n, [&](int part, int thread) {
+        int begin = begin_of(part), end = begin_of(part + 1);
+        for (int m = model_of(begin, first); begin < end; begin = first[++m])
+            work(part, m, begin - first[m], std::min(end, first[m + 1]) - first[m], thread);
+    });
+}
+
+// ---- a face on the screen ----
 
 // Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers; depth and barycentric
 // coordinates come from the corners as they are.
@@ -330,7 +351,7 @@ struct Barycentric {
 };
 
 // Also completes c by the depth, sum(z_i e_i) / sum(w_i e_i): the denominator is |det| everywhere.
-Barycentric planes(Screen s, Coverage& c) {
+INLINED Barycentric planes(Screen& s, Coverage& c) {
     // The products of three coordinates that follow stay within the range of a double for these sizes; others are
     // scaled.
     if (!(s.size > 0x1p-200 && s.size < 0x1p200))
@@ -395,7 +416,7 @@ INLINED long for_each_in_box(const Coverage& c, const Edge (&edges)[3], int y_be
         Lanes e[3] = {row[0], row[1], row[2]};
         for (int x0 = c.xmin / lanes * lanes; x0 <= c.xmax; x0 += lanes) {
             const mask inside = (min(min(e[0], e[1]), e[2]) > -1) & (lane_numbers < c.xmax + 1 - x0);
-            if (any(inside)) visit(x0, y, inside);
+            visit(x0, y, inside);
             inside_in_all = inside_in_all + select(inside, Lanes(1), 0);
             for (int i = 0; i < 3; i++) e[i] = e[i] + right[i];
         }
@@ -524,23 +545,6 @@ struct Pass {
         return total;
     }
 
-    // Vertices or faces are dealt out in parts of consecutive ones. A thread gets several, in case that some take
-    // longer than others; none is worth fewer than 64.
-    static int parts(const std::vector<int>& first) { return std::clamp(first.back() / 64, 1, 8 * thread_count()); }
-    template <class Work>
-    static void in_parts(const std::vector<int>& first, Work&& work) {
-        const int n = parts(first);
-        const auto begin_of = [&](int part) { return static_cast<int>(std::int64_t{first.back()} * part / n); };
-        parallel_for(n, [&](int part, int thread) {
-            int begin = begin_of(part), end = begin_of(part + 1);
-            for (int s = shader_of(begin, first); begin < end; begin = first[++s])
-                work(part, s, begin - first[s], std::min(end, first[s + 1]) - first[s], thread);
-        });
-    }
-    static int shader_of(int i, const std::vector<int>& first) {
-        return static_cast<int>(std::upper_bound(first.begin(), first.end(), i) - first.begin()) - 1;
-    }
-
     Vertex placed(const vec4& s) const {
         const bool inside = s.w >= w_near && s.x >= -guard * s.w && s.x <= (width + guard) * s.w &&
                             s.y >= -guard * s.w && s.y <= (height + guard) * s.w && s.w <= 0x1p100 &&
@@ -582,7 +586,7 @@ struct Pass {
         if (picture) w.nearest.assign(cells, -1), w.faces.clear();
         for (const Block& b : blocks)
             for (const int number : b.touching[strip]) {
-                const int s = shader_of(number, first_face);
+                const int s = model_of(number, first_face);
                 Face face{{}, s, number - first_face[s], number};
                 Screen screen;
                 Point corners[most_corners];
@@ -749,86 +753,130 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
 int LightGrid::good_cells(const std::vector<Model>& models) {
     int faces = 0;
     for (const Model& model : models) faces += model.nfaces();
-    return std::clamp(static_cast<int>(std::sqrt(faces)), 1, 2048);
+    return std::clamp(static_cast<int>(std::sqrt(faces / 2.)), 1, 2048);
 }
 
 LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int cells) : cells_(cells) {
     const mat4 to_screen = light.to_screen();
-    for (const Model& model : models)
-        for (int corner = 0; corner < model.nfaces() * 3; corner++)
-            corners_.push_back(project(to_screen * point(model.vert(corner / 3, corner % 3))));
-    const int faces = static_cast<int>(corners_.size() / 3);
+    std::vector<int> first_vert{0}, first_face{0};
+    for (const Model& model : models) {
+        first_vert.push_back(first_vert.back() + model.nverts());
+        first_face.push_back(first_face.back() + model.nfaces());
+    }
+    verts_.resize(first_vert.back()), faces_.resize(first_face.back());
+    in_parts(first_vert, [&](int, int m, int begin, int end, int) {
+        for (int i = begin; i < end; i++) verts_[first_vert[m] + i] = project(to_screen * point(models[m].vert(i)));
+    });
+    in_parts(first_face, [&](int, int m, int begin, int end, int) {
+        for (int i = begin; i < end; i++)
+            for (int k = 0; k < 3; k++) faces_[first_face[m] + i][k] = first_vert[m] + models[m].corner(i, k).vert;
+    });
+    for (const vec3& v : verts_) zmax_ = std::max(zmax_, std::fabs(v.z));
+
+    // The cells of a face's box.
+    struct Box {
+        int x0, x1, y0, y1;
+    };
     const auto cell_of = [&](double v) { return v > 0 ? static_cast<int>(std::min(v, cells_ - 1.)) : 0; };  // NaN: 0
+    const auto box_of = [&](int face) {
+        const vec3 &a = verts_[faces_[face][0]], &b = verts_[faces_[face][1]], &c = verts_[faces_[face][2]];
+        return Box{cell_of(std::min({a.x, b.x, c.x})), cell_of(std::max({a.x, b.x, c.x})),
+                   cell_of(std::min({a.y, b.y, c.y})), cell_of(std::max({a.y, b.y, c.y}))};
+    };
     // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a
     // face, the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of
     // faces.
-    constexpr double most_entries = 64;
-    const auto box_cells = [&] {
-        double sum = 0;
-        for (int f = 0; f < faces; f++) {
-            const vec3* const p = &corners_[std::size_t{3} * f];
-            const auto [x0, x1] = std::minmax({p[0].x, p[1].x, p[2].x});
-            const auto [y0, y1] = std::minmax({p[0].y, p[1].y, p[2].y});
-            sum += (cell_of(x1 * scale_) - cell_of(x0 * scale_) + 1.) *
-                   (cell_of(y1 * scale_) - cell_of(y0 * scale_) + 1.);
-        }
-        return sum;
-    };
-    while (cells_ > 1 && box_cells() > most_entries * faces) cells_ = (cells_ + 1) / 2, scale_ /= 2;
-    for (vec3& p : corners_) p.x *= scale_, p.y *= scale_;
+    constexpr std::int64_t most_entries = 64;
+    for (;;) {
+        std::atomic<std::int64_t> sum = 0;
+        in_parts(first_face, [&](int, int m, int begin, int end, int) {
+            std::int64_t own = 0;
+            for (int i = begin; i < end; i++) {
+                const Box box = box_of(first_face[m] + i);
+                own += std::int64_t{box.x1 - box.x0 + 1} * (box.y1 - box.y0 + 1);
+            }
+            sum += own;
+        });
+        if (cells_ == 1 || sum <= most_entries * first_face.back()) break;
+        cells_ = (cells_ + 1) / 2, scale_ /= 2;
+        for (vec3& v : verts_) v.x /= 2, v.y /= 2;
+    }
 
-    // The cells that a face touches: those of its box that lie on the inner side of its three edges, at least in part.
-    // A face that the light sees edge-on casts no shadow.
-    const auto for_each_cell = [&](int face, auto&& visit) {
-        const vec3* const p = &corners_[std::size_t{3} * face];
-        const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
+    // The cells on the rows [y_begin, y_end) that a face touches: those of its box that lie on the inner side of its
+    // three edges, at least in part. A face that the light sees edge-on casts no shadow.
+    const auto for_each_cell = [&](int face, int y_begin, int y_end, auto&& visit) {
+        const vec3* const p[] = {&verts_[faces_[face][0]], &verts_[faces_[face][1]], &verts_[faces_[face][2]]};
+        const double area = (p[1]->x - p[0]->x) * (p[2]->y - p[0]->y) - (p[1]->y - p[0]->y) * (p[2]->x - p[0]->x);
         if (!(std::fabs(area) > 0)) return;  // nor one beyond the range of a double
         const double side = area < 0 ? -1 : 1;
-        const int x0 = cell_of(std::min({p[0].x, p[1].x, p[2].x})), x1 = cell_of(std::max({p[0].x, p[1].x, p[2].x}));
-        const int y0 = cell_of(std::min({p[0].y, p[1].y, p[2].y})), y1 = cell_of(std::max({p[0].y, p[1].y, p[2].y}));
-        for (int y = y0; y <= y1; y++) {
-            for (int x = x0; x <= x1; x++) {
+        const Box box = box_of(face);
+        const bool is_one_cell = box.x0 == box.x1 && box.y0 == box.y1;
+        for (int y = std::max(y_begin, box.y0); y < std::min(y_end, box.y1 + 1); y++) {
+            for (int x = box.x0; x <= box.x1; x++) {
                 bool outside = false;
-                for (int i = 0; i < 3 && !outside; i++) {
-                    const vec3 &a = p[i], &b = p[(i + 1) % 3];
+                for (int i = 0; i < 3 && !outside && !is_one_cell; i++) {
+                    const vec3 &a = *p[i], &b = *p[(i + 1) % 3];
                     // The cell's corner farthest inwards. Rounding of the products is below 2^-50 of their size.
                     const double nx = side * (a.y - b.y), ny = side * (b.x - a.x);
                     const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
                     outside = nx * dx + ny * dy < -(std::fabs(nx * dx) + std::fabs(ny * dy)) * 0x1p-48;
                 }
-                if (!outside) visit(std::size_t{1} * cells_ * y + x);
+                if (!outside) visit(std::size_t{1} * cells_ * (y - y_begin) + x);
             }
         }
     };
-    // Count, sum up, fill: a list for each cell in one array.
-    const std::size_t count = std::size_t{1} * cells_ * cells_;
-    first_.assign(count + 2, 0);
-    for (int f = 0; f < faces; f++) for_each_cell(f, [&](std::size_t c) { first_[c + 2]++; });
-    for (std::size_t c = 2; c < first_.size(); c++) first_[c] += first_[c - 1];
-    entries_.resize(first_.back());
-    for (int f = 0; f < faces; f++) {
-        const vec3* const p = &corners_[std::size_t{3} * f];
-        const float zmax = std::nextafter(static_cast<float>(std::max({p[0].z, p[1].z, p[2].z})), INFINITY);
-        for_each_cell(f, [&](std::size_t c) { entries_[first_[c + 1]++] = {zmax, f}; });
-    }
-    first_.pop_back();
-    for (std::size_t c = 0; c < count; c++)
-        std::sort(entries_.begin() + first_[c], entries_.begin() + first_[c + 1], [](const Entry& a, const Entry& b) {
-            return a.zmax != b.zmax ? a.zmax > b.zmax : a.face < b.face;
+    // The cells are filled in bands of rows, each by one thread. Which faces touch a band is found first.
+    band_rows_ = (cells_ + 63) / 64;
+    bands_.resize((cells_ + band_rows_ - 1) / band_rows_);
+    std::vector<std::vector<std::vector<int>>> touching(parts(first_face));
+    for (auto& faces_of_band : touching) faces_of_band.resize(bands_.size());
+    in_parts(first_face, [&](int part, int m, int begin, int end, int) {
+        for (int face = first_face[m] + begin; face < first_face[m] + end; face++) {
+            const Box box = box_of(face);
+            for (int b = box.y0 / band_rows_; b <= box.y1 / band_rows_; b++) touching[part][b].push_back(face);
+        }
+    });
+    parallel_for(static_cast<int>(bands_.size()), [&](int b, int) {
+        auto& [first, entries] = bands_[b];
+        const auto for_each_entry = [&](auto&& visit) {
+            for (const auto& faces_of_band : touching)
+                for (const int face : faces_of_band[b])
+                    for_each_cell(face, b * band_rows_, (b + 1) * band_rows_, [&](std::size_t c) { visit(c, face); });
+        };
+        // Count, sum up, fill: a list for each cell in one array.
+        const std::size_t count = std::size_t{1} * cells_ * band_rows_;
+        first.assign(count + 2, 0);
+        for_each_entry([&](std::size_t c, int) { first[c + 2]++; });
+        for (std::size_t c = 2; c < first.size(); c++) first[c] += first[c - 1];
+        entries.resize(first.back());
+        for_each_entry([&](std::size_t c, int face) {
+            const auto [i, j, k] = faces_[face];
+            const double zmax = std::max({verts_[i].z, verts_[j].z, verts_[k].z});
+            entries[first[c + 1]++] = {std::nextafter(static_cast<float>(zmax), INFINITY), face};
         });
-    for (const vec3& p : corners_) zmax_ = std::max(zmax_, std::fabs(p.z));
+        first.pop_back();
+        const auto is_nearer = [](const Entry& p, const Entry& q) {
+            return p.zmax != q.zmax ? p.zmax > q.zmax : p.face < q.face;
+        };
+        for (std::size_t c = 0; c < count; c++)
+            std::sort(entries.begin() + first[c], entries.begin() + first[c + 1], is_nearer);
+    });
 }
 
 std::size_t LightGrid::bytes() const {
-    return corners_.size() * sizeof(vec3) + first_.size() * sizeof(first_[0]) + entries_.size() * sizeof(Entry);
+    std::size_t sum = verts_.size() * sizeof(vec3) + faces_.size() * sizeof(faces_[0]);
+    for (const auto& [first, entries] : bands_) sum += first.size() * sizeof(first[0]) + entries.size() * sizeof(Entry);
+    return sum;
 }
 
 bool LightGrid::shadows(const vec3& on_screen, int number) const {
     const vec3 p{on_screen.x * scale_, on_screen.y * scale_, on_screen.z};
     if (!(p.x >= 0 && p.y >= 0 && p.x < cells_ && p.y < cells_)) return false;  // beside all casters
-    const std::size_t c = std::size_t{1} * cells_ * static_cast<int>(p.y) + static_cast<int>(p.x);
-    for (std::uint32_t i = first_[c]; i < first_[c + 1]; i++) {
-        const Entry& e = entries_[i];
+    const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
+    const auto& [first, entries] = bands_[y / band_rows_];
+    const std::size_t c = std::size_t{1} * cells_ * (y % band_rows_) + x;
+    for (std::uint32_t i = first[c]; i < first[c + 1]; i++) {
+        const Entry& e = entries[i];
         if (double{e.zmax} <= p.z) return false;  // nor do those that follow reach higher
         if (e.face != number && covers(e.face, p)) return true;
     }
@@ -845,8 +893,8 @@ mask LightGrid::shadows(const vec<3, coord>& on_screen, int number) const {
 // the barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls
 // through.
 bool LightGrid::covers(int face, const vec3& p) const {
-    const vec3* const q = &corners_[std::size_t{3} * face];
-    const vec3 a = q[0] - p, b = q[1] - p, c = q[2] - p;
+    const auto [i, j, k] = faces_[face];
+    const vec3 a = verts_[i] - p, b = verts_[j] - p, c = verts_[k] - p;
     const double u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
     const bool left = u >= 0 && v >= 0 && w >= 0, right = u <= 0 && v <= 0 && w <= 0;
     if (!left && !right) return false;

@@ -10,6 +10,7 @@
 #include "model.h"
 #include "tgaimage.h"
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -224,10 +225,10 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
 class LightGrid {
 public:
     LightGrid() = default;
-    // The light's screen is cells x cells large and shows all faces. Takes at most 584 bytes a face and 4 a cell.
+    // The light's screen is cells x cells large and shows all faces. Takes at most 860 bytes a face and 4 a cell.
     LightGrid(const std::vector<Model>& models, const Camera& light, int cells);
 
-    // About one cell a face: measured, fewer make long lists and more take longer to fill than they save.
+    // Half a cell a face: measured, fewer make long lists and more take longer to fill than they save.
     static int good_cells(const std::vector<Model>& models);
 
     // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
@@ -243,10 +244,15 @@ private:
     };
     bool covers(int face, const vec3& p) const;
 
-    int cells_ = 0;                     // a side
-    double scale_ = 1;                  // cells to a pixel of the light's screen
-    double zmax_ = 0;                   // the largest |z| of all corners
-    std::vector<vec3> corners_;         // three a face
-    std::vector<std::uint32_t> first_;  // entries of cell c: first_[c] to first_[c+1]
-    std::vector<Entry> entries_;        // in each cell the nearest to the light first
+    struct Band {
+        std::vector<std::uint32_t> first;  // entries of cell c: first[c] to first[c+1]
+        std::vector<Entry> entries;        // in each cell the nearest to the light first
+    };
+    int cells_ = 0;                          // a side
+    int band_rows_ = 1;                      // of cells, in a band
+    double scale_ = 1;                       // cells to a pixel of the light's screen
+    double zmax_ = 0;                        // the largest |z| of all vertices
+    std::vector<vec3> verts_;                // x and y in cells
+    std::vector<std::array<int, 3>> faces_;  // as indices of vertices
+    std::vector<Band> bands_;
 };
