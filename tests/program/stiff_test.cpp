@@ -8,13 +8,13 @@
 #ifdef UMBRA_REPORT
 static const std::string reporter = "\"" UMBRA_REPORT "\"";
 #else
-static const std::string reporter = umbra + " --report";
+static const std::string reporter = umbra_command + " --report";
 #endif
 
 namespace {
 
 struct Figures {  // what the ray caster says of a picture, in pixels
-    long coverage, facing, falsely_dark, falsely_lit;
+    double coverage, facing, falsely_dark, falsely_lit;
     bool operator==(const Figures&) const = default;
 };
 
@@ -27,7 +27,7 @@ struct Scene : Folder {
     explicit Scene(const std::string& obj) { write("m.obj", obj); }
 
     // The run must succeed and say nothing on standard error.
-    Outcome good(const std::string& options, const std::string& program = umbra) const {
+    Outcome good(const std::string& options, const std::string& program = umbra_command) const {
         for (const std::string earlier : {"framebuffer.tga", "depth.tga"}) std::filesystem::remove(*this / earlier);
         const Outcome o = run("--quiet --size 60x60 --shadow-size 128 " + options + " m.obj", program);
         if (!CHECK_EQ(o.err, std::string()) || !CHECK_EQ(o.status, 0)) std::cerr << "    umbra " << options << '\n';
@@ -60,15 +60,15 @@ struct Scene : Folder {
     }
     // Not a pixel is dark that should be lit. If all is to be right, none is lit that should be dark either, and what
     // the ray caster sees is what is drawn.
-    void check_shadows(const std::string& options, long least, bool all_right) const {
+    void check_shadows(const std::string& options, int least, bool all_right) const {
         const Figures is = report(options);
         const bool right = is.falsely_dark == 0 && (!all_right || (is.falsely_lit == 0 && is.coverage == 0));
         if (!CHECK(right) || !CHECK(is.facing >= least)) std::cerr << "    umbra " << options << '\n';
     }
-    void check_exact(const Strings& options, long least) const {
+    void check_exact(const Strings& options, int least) const {
         for (const std::string& o : options) check_shadows("--shadow exact " + o, least, true);
     }
-    void check_lit(const std::string& options, long least) const {
+    void check_lit(const std::string& options, int least) const {
         for (const std::string method : {"map ", "exact "}) check_shadows("--shadow " + method + options, least, false);
     }
 };
@@ -315,7 +315,7 @@ std::string check_cells(int columns, int rows) {
         text += "f -4 -3 -2 -1\n";
     }
     const std::string out = Scene(text).run("--size 80x80 --shadow off --eye 0,0,4 m.obj").out;
-    CHECK_EQ(value(out, "triangles"), 2l * columns * rows);
+    CHECK_EQ(value(out, "triangles"), 2. * columns * rows);
     CHECK_EQ(value(out, "pixels"), 3600);
     CHECK_EQ(value(out, "hidden"), 0);
     return out;
@@ -323,7 +323,7 @@ std::string check_cells(int columns, int rows) {
 
 // The model must not vanish. Each pixel's centre is in the boxes of both triangles of a cell; all others are left out.
 TEST("triangles: a million that are smaller than a pixel") {
-    CHECK_EQ(value(check_cells(708, 708), "between_samples"), 2l * 708 * 708 - 2 * 3600);
+    CHECK_EQ(value(check_cells(708, 708), "between_samples"), 2. * 708 * 708 - 2 * 3600);
 }
 
 TEST("triangles: needles of 1 to 500000 side by side, and of 1 to 1e6 where they cover a centre") {
@@ -517,7 +517,7 @@ TEST("shadow: a buffer of 1x1, 2x2, 3x3 and 16384x16384") {
 #if !defined(UMBRA_SANITIZED) && defined(__linux__)
 TEST("pictures: 16384x16384 within its memory") {
     const std::string limit = "ulimit -v " + std::to_string((1548 + 128) * 1024);  // KiB; 128 MiB for all else
-    CHECK(Scene(yard()).good("--threads 2 --size 16384x16384", limit + " && " + umbra).frame.size() > 1000000);
+    CHECK(Scene(yard()).good("--threads 2 --size 16384x16384", limit + " && " + umbra_command).frame.size() > 1000000);
 }
 #endif
 

@@ -36,7 +36,7 @@ int main(int argc, char** argv) try {
     }
 
     // A plane under grazing light: nothing shadows it.
-    const std::filesystem::path plane = umbra.folder() / "plane.obj";
+    const std::filesystem::path plane = umbra / "plane.obj";
     std::ofstream(plane) << "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n";
     for (const std::string n_l : {".1", ".01", ".001", ".0001"}) {
         Judge judge(umbra, {"--light", ".8," + n_l + ",.6", plane.string()});

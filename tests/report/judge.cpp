@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <thread>
 
 // The same faces in the same order.
@@ -22,7 +23,7 @@ static void write_copy(const std::filesystem::path& path, const Model& model, co
     if (!out.flush()) throw std::runtime_error(path.string() + ": cannot write");
 }
 
-Scene::Scene(const Arguments& arguments, const TemporaryFolder& folder)
+Scene::Scene(const Strings& arguments, const TemporaryFolder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     const auto vector = [](vec3& v) {
         return [&v](const char* s) { std::sscanf(s, "%lf,%lf,%lf", &v.x, &v.y, &v.z); };
@@ -89,17 +90,17 @@ PictureError compare(const TruthImage& truth, const TGAImage& picture, const TGA
     return error;
 }
 
-TGAImage Judge::draw(const Arguments& arguments, const Arguments& more) const {
+TGAImage Judge::draw(const Strings& arguments, const Strings& more) const {
     program_.run(joined(joined(arguments, more), {"--quiet"}));
-    return TGAImage::read_tga_file(program_.folder() / "framebuffer.tga");
+    return TGAImage::read_tga_file(program_ / "framebuffer.tga");
 }
 
-PictureError Judge::error(const Arguments& method) {
+PictureError Judge::error(const Strings& method) {
     const TGAImage picture = draw(joined(arguments_, method), {"--draw", "color"});
     if (!scene_) {
-        scene_.emplace(arguments_, program_.folder());
+        scene_.emplace(arguments_, program_);
         truth_ = cast(RayCaster(scene_->models), scene_->view, scene_->light, scene_->threads);
-        Arguments exact = arguments_;
+        Strings exact = arguments_;
         for (auto bias = exact.end(); (bias = std::find(exact.begin(), exact.end(), "--bias")) != exact.end();)
             exact.erase(bias, bias + 2);
         exact_ = draw(exact, {"--shadow", "exact", "--draw", "color"});

@@ -1,7 +1,7 @@
 // judge.h: how far the program's pictures are from the truth. It runs the program, reads its pictures and holds them
 // against the ray caster; it knows the program by its options and pictures alone.
 #pragma once
-#include "program.h"
+#include "run.h"
 #include "tgaimage.h"
 #include "truth.h"
 
@@ -11,12 +11,12 @@ struct Scene {
     View view;
     vec3 light{1, 1, 0};
     int threads;
-    Arguments paths;
+    Strings paths;
     std::vector<Model> models;
-    Arguments towards_light;  // the arguments once more, with copies of the models whose normals all point to the light
+    Strings towards_light;  // the arguments once more, with copies of the models whose normals all point to the light
 
     // Of arguments that the program accepts; the copies are written into the folder. Throws what Model does.
-    Scene(const Arguments& arguments, const TemporaryFolder& folder);
+    Scene(const Strings& arguments, const TemporaryFolder& folder);
 };
 
 struct PictureError {
@@ -40,17 +40,17 @@ PictureError compare(const TruthImage& truth, const TGAImage& picture, const TGA
 // Judges pictures of one scene that differ in their shadows.
 class Judge {
 public:
-    Judge(const Program& program, const Arguments& scene) : program_(program), arguments_(scene) {}
+    Judge(const Program& program, const Strings& scene) : program_(program), arguments_(scene) {}
 
     // Runs the program with the scene's arguments and a method's. Throws ProgramFailed, and what Model, the ray caster
     // and the reader of pictures throw.
-    PictureError error(const Arguments& method = {});
+    PictureError error(const Strings& method = {});
 
 private:
-    TGAImage draw(const Arguments& arguments, const Arguments& more) const;
+    TGAImage draw(const Strings& arguments, const Strings& more) const;
 
     const Program& program_;
-    Arguments arguments_;
+    Strings arguments_;
     std::optional<Scene> scene_;  // this and the next two are made when the program has accepted the arguments
     TruthImage truth_;
     TGAImage exact_;

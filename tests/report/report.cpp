@@ -33,7 +33,7 @@ constexpr int tolerated_from = 800;             // ... from which size up
 
 std::vector<Figures> methods() {
     std::vector<Figures> all;
-    for (const auto& [name, arguments] : {std::pair<const char*, Arguments>{"shadow map", {"--shadow", "map"}},
+    for (const auto& [name, arguments] : {std::pair<const char*, Strings>{"shadow map", {"--shadow", "map"}},
                                           {"constant bias", {"--bias", bias}}})
         for (const int size : {200, 400, 800, 1600, 3200, 6400})
             all.push_back({name, size, joined(arguments, {"--shadow-size", std::to_string(size)})});
@@ -44,7 +44,7 @@ std::vector<Figures> methods() {
 }
 
 // All methods in turn, round after round: what slows the machine down for a while slows all of them.
-void measure_times(const Program& umbra, const Arguments& scene, int rounds, std::vector<Figures>& figures) {
+void measure_times(const Program& umbra, const Strings& scene, int rounds, std::vector<Figures>& figures) {
     std::vector<std::vector<double>> depth(figures.size()), shade = depth, total = depth;
     const auto median = [](std::vector<double> values) {
         std::sort(values.begin(), values.end());
@@ -54,17 +54,17 @@ void measure_times(const Program& umbra, const Arguments& scene, int rounds, std
         std::cerr << "report: times, round " << round << " of " << rounds << '\n';
         for (std::size_t i = 0; i < figures.size(); i++) {
             Figures& f = figures[i];
-            const Values said = umbra.run(joined(scene, f.arguments));
-            depth[i].push_back(value_of(said, "depth_ms")), shade[i].push_back(value_of(said, "shade_ms"));
+            const std::string said = umbra.run(joined(scene, f.arguments));
+            depth[i].push_back(value(said, "depth_ms")), shade[i].push_back(value(said, "shade_ms"));
             total[i].push_back(depth[i].back() + shade[i].back());
             f.depth_ms = median(depth[i]), f.shade_ms = median(shade[i]), f.total_ms = median(total[i]);
-            f.bytes = std::llround(value_of(said, "shadow_bytes"));
+            f.bytes = std::llround(value(said, "shadow_bytes"));
         }
     }
 }
 
-void predict_errors(const Program& umbra, const Arguments& arguments, std::vector<Figures>& figures) {
-    const Scene scene(arguments, umbra.folder());
+void predict_errors(const Program& umbra, const Strings& arguments, std::vector<Figures>& figures) {
+    const Scene scene(arguments, umbra);
     const Theorist theorist(RayCaster(scene.models), scene.view, scene.light, scene.threads);
     // The needles of the constant bias, up to sqrt(2)/25 of it long, are safe on surfaces of a slope up to 17.
     constexpr double short_texel = scene_bias / 25;
@@ -125,7 +125,7 @@ void print(const std::vector<Figures>& figures, const std::vector<StiffRow>& sti
     print_columns(csv(stiff), 2, 5);
 }
 
-void make_table(const Program& umbra, Arguments scene) {
+void make_table(const Program& umbra, Strings scene) {
     const auto taken = [&](const std::string& option, const std::string& otherwise) {  // out of the arguments
         const auto at = std::find(scene.begin(), scene.end(), option);
         if (at == scene.end()) return otherwise;
@@ -156,7 +156,7 @@ void make_table(const Program& umbra, Arguments scene) {
     print(figures, stiff);
 
     std::string title = "Shadow error against time:";
-    for (const std::string& path : Scene(scene, umbra.folder()).paths)
+    for (const std::string& path : Scene(scene, umbra).paths)
         title.append(title.back() == ':' ? " " : ", ").append(std::filesystem::path(path).stem().string());
     const std::string subtitle = side + (" pixels, threads: " + threads) + ", median of " + rounds +
                                  " runs. Numbers at the marks: texels a side of the shadow buffer.";
@@ -168,7 +168,7 @@ void make_table(const Program& umbra, Arguments scene) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-    const Arguments arguments(argv + 1, argv + argc);
+    const Strings arguments(argv + 1, argv + argc);
     const auto given = [&](const char* option) {
         return std::find(arguments.begin(), arguments.end(), option) != arguments.end();
     };

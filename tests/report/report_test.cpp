@@ -101,12 +101,12 @@ TEST("the scene is read from umbra's arguments, and a copy of each model turns i
     const TemporaryFolder folder("report_test");
     const std::string path = (folder / "far.obj").string();
     std::ofstream(path) << "v 6 0 0\nv 10 0 0\nv 6 2 .1\nvn 0 0 -1\nf 1//1 2//1 3//1\n";
-    const Arguments given{"--size", "30x20", "--light",  "0,3,4", "--shadow", "map",
+    const Strings given{"--size", "30x20", "--light",  "0,3,4", "--shadow", "map",
                           "--eye",  "1,2,3", "--center", "0,0,1"};
     const Scene scene(joined(given, {path, "--quiet"}), folder);
     CHECK(scene.view.width == 30 && scene.view.height == 20 && scene.light == (vec3{0, 3, 4}));
     CHECK(scene.view.eye == (vec3{1, 2, 2}) && scene.view.center == vec3{} && scene.view.up == (vec3{0, 1, 0}));
-    CHECK(scene.paths == Arguments{path});
+    CHECK(scene.paths == Strings{path});
     CHECK_NEAR(norm(scene.models.at(0).vert(0, 1) - vec3{1, -.5, -1.025}), 0, 1e-15);
     CHECK_EQ(scene.towards_light.size(), given.size() + 2);
     const Model copy(scene.towards_light.back()), original(path);

@@ -11,12 +11,6 @@
 
 namespace {
 
-std::string file(const Program& umbra, const std::string& text) {
-    const std::string path = (umbra.folder() / "scene.obj").string();
-    write_bytes(path, Bytes(text.begin(), text.end()));
-    return path;
-}
-
 // [-1,1]^2 at y = 0, seen from above, in n x n squares.
 std::string floor_of(int n) {
     Obj scene;
@@ -39,7 +33,7 @@ std::string needles(double length_to_width) {
     return scene.text();
 }
 
-PictureError error(const Program& umbra, const Arguments& arguments) {
+PictureError error(const Program& umbra, const Strings& arguments) {
     return Judge(umbra, joined({"--size", "400x400"}, arguments)).error();
 }
 
@@ -88,12 +82,11 @@ struct Corners {
     double worst(Place&& place, const vec<3, real>& low, const vec<3, real>& high, real from, real side) const {
         double worst = 0;
         for (std::size_t i = 0; i < at.size(); i++) {
-            real off[2];
-            for (int k = 0; k < 2; k++)
-                off[k] = place(i)[k] - (from + side * (exact[i][k] - low[k]) / (high[k] - low[k]));
-            const real distance = std::hypot(off[0], off[1]);
-            worst =
-                std::max(worst, std::isfinite(distance) ? std::min(static_cast<double>(distance), double{size}) : size);
+            const auto off = [&](int k) {
+                return place(i)[k] - (from + side * (exact[i][k] - low[k]) / (high[k] - low[k]));
+            };
+            const real distance = std::fmin(std::hypot(off(0), off(1)), real{size});  // size also where it is no number
+            worst = std::max(worst, static_cast<double>(distance));
         }
         return worst;
     }
@@ -117,7 +110,7 @@ struct Corners {
         Obj scene;
         for (std::size_t i = 0; i < at.size(); i++)
             scene.polygon({at[i], at[(i + 1) % at.size()], at[(i + 57) % at.size()]});
-        std::vector<Model> models(1, Model(file(umbra, scene.text())));
+        std::vector<Model> models(1, Model(umbra.write("scene.obj", scene.text())));
         models[0].move(-center);
         if (models[0].nfaces() != static_cast<int>(at.size())) throw std::logic_error("a corner is lost");
         const Camera viewer{lookat(eye - center, {}, {0, 1, 0}), projection(-1 / norm(eye - center)),
@@ -146,22 +139,20 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     };
 
     constexpr double sub_pixel = 1. / 256;  // the step of 8 sub-pixel bits, the least that a rasterizer has
-    const std::vector<double> distances{1, 1e3, 1e6, 1e9, 1e12, 1e15}, eyes{1.2, 1e2, 1e4, 1e6, 1e8},
-        grazing{.1, 1e-2, 1e-3, 1e-4, 1e-6};
-    const auto moved = [](double d) { return Corners({d, -d / 2, d}, {1, 1, 4}); };
-    const auto seen_from = [](double d) { return Corners({}, normalized(vec3{1, 1, 4}) * d); };
-    const std::string classic = "classic Mshadow in float: pixels";
-    family("scene moved away by", classic, sub_pixel, distances, [&](double d) { return moved(d).classic(); });
-    family("scene moved away by", "Mshadow: pixels", sub_pixel, distances,
-           [&](double d) { return moved(d).here(umbra); });
-    family("eye's distance (1/c)", classic, sub_pixel, eyes, [&](double d) { return seen_from(d).classic(); });
-    family("eye's distance (1/c)", "Mshadow: pixels", sub_pixel, eyes,
-           [&](double d) { return seen_from(d).here(umbra); });
+    const auto both_ways = [&](const std::string& name, const std::vector<double>& steps, auto corners) {
+        family(name, "classic Mshadow in float: pixels", sub_pixel, steps,
+               [&](double d) { return corners(d).classic(); });
+        family(name, "Mshadow: pixels", sub_pixel, steps, [&](double d) { return corners(d).here(umbra); });
+    };
+    both_ways("scene moved away by", {1, 1e3, 1e6, 1e9, 1e12, 1e15},
+              [](double d) { return Corners({d, -d / 2, d}, {1, 1, 4}); });
+    both_ways("eye's distance (1/c)", {1.2, 1e2, 1e4, 1e6, 1e8},
+              [](double d) { return Corners({}, normalized(vec3{1, 1, 4}) * d); });
 
-    const std::string plane = file(umbra, floor_of(1));
-    for (const Arguments& method : {Arguments{"--bias", "43.34"}, {"--shadow", "map"}, {"--shadow", "exact"}})
-        family("light over a plane at n.l", method[0] + " " + method[1] + ": falsely dark %", 0, grazing,
-               [&](double n_l) {
+    const std::string plane = umbra.write("scene.obj", floor_of(1));
+    for (const Strings& method : {Strings{"--bias", "43.34"}, {"--shadow", "map"}, {"--shadow", "exact"}})
+        family("light over a plane at n.l", method[0] + " " + method[1] + ": falsely dark %", 0,
+               {.1, 1e-2, 1e-3, 1e-4, 1e-6}, [&](double n_l) {
                    const PictureError e = error(umbra, joined(method, {"--light", ".8," + number(n_l) + ",.6", plane}));
                    return e.percent(e.falsely_dark);
                });
@@ -174,18 +165,19 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
                         number(.077 + .037 * (at.x + at.y) + (layer == "2" ? gap : 0)) + '\n';
             text += "f -3//" + layer + " -2//" + layer + " -1//" + layer + '\n';
         }
-        umbra.run({"--size", "100x100", "--no-fit", "--eye", "0,0,4", "--draw", "normal", file(umbra, text)});
-        const TGAImage picture = TGAImage::read_tga_file(umbra.folder() / "framebuffer.tga");
+        const std::string path = umbra.write("scene.obj", text);
+        umbra.run({"--size", "100x100", "--no-fit", "--eye", "0,0,4", "--draw", "normal", path});
         int rear = 0;
-        for (int i = 0; i < 10000; i++) rear += picture.pixel(i % 100, i / 100)[0] == 255;  // blue: towards the viewer
+        umbra.each_pixel([&](int, int, const std::uint8_t* bgr) { rear += bgr[0] == 255; });  // towards the viewer
         return rear / 100.;
     });
 
     // Pixels that are wrong with exact shadows: by what is covered or by what is shadowed.
     const auto wrong_pixels = [&](const std::string& name, double bearable, const std::vector<double>& steps,
-                                  const Arguments& view, const std::function<std::string(double)>& scene) {
+                                  const Strings& view, const std::function<std::string(double)>& scene) {
         family(name, "exact: wrong pixels", bearable, steps, [&](double s) {
-            const PictureError e = error(umbra, joined(view, {"--shadow", "exact", file(umbra, scene(s))}));
+            const std::string path = umbra.write("scene.obj", scene(s));
+            const PictureError e = error(umbra, joined(view, {"--shadow", "exact", path}));
             return static_cast<double>(e.coverage + e.falsely_dark + e.falsely_lit);
         });
     };

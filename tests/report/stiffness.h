@@ -2,7 +2,7 @@
 // from the origin, more grazing, larger, smaller, nearer. The report's second table. Whether each case has the outcome
 // that it should have is the business of stiff_test.
 #pragma once
-#include "program.h"
+#include "run.h"
 
 struct StiffRow {
     std::string family;   // what grows

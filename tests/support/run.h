@@ -1,5 +1,5 @@
-// run.h: runs the program in a folder of its own, as a shell does, and collects what it says and what it leaves there.
-// For tests of the program from outside; it needs UMBRA_BINARY.
+// run.h: runs a program as a shell does, and collects what it says and the pictures that it leaves in a folder. For
+// tests of umbra from outside, and for the report and the gate that judge it; it needs UMBRA_BINARY.
 #pragma once
 #include "check.h"
 #include "files.h"
@@ -9,6 +9,11 @@
 #include <cstdlib>
 
 using Strings = std::vector<std::string>;
+
+inline Strings joined(Strings a, const Strings& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
 
 // The text once for each value, which takes the place of every %.
 inline Strings each(const std::string& text, const Strings& values) {
@@ -20,7 +25,22 @@ inline Strings each(const std::string& text, const Strings& values) {
     return all;
 }
 
-inline const std::string umbra = "\"" UMBRA_BINARY "\"";
+inline std::string quoted(const std::string& argument) {  // for a POSIX shell
+    std::string out = "'";
+    for (const char c : argument) out += c == '\'' ? "'\\''" : std::string(1, c);
+    return out + "'";
+}
+
+inline long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
+
+// The number after the name in a line of names and values.
+inline double value(const std::string& line, const std::string& name) {
+    const std::size_t at = (' ' + line).find(' ' + name + ' ');
+    if (at == std::string::npos) throw std::runtime_error("no " + name + " in: " + line);
+    return std::stod(line.substr(at + name.size() + 1));
+}
+
+inline const std::string umbra_command = "\"" UMBRA_BINARY "\"";
 
 struct Outcome {
     int status;
@@ -30,8 +50,9 @@ struct Outcome {
 
 struct Folder : TemporaryFolder {
     Folder() : TemporaryFolder("run") {}
-    void write(const std::string& name, const std::string& text) const {
+    std::string write(const std::string& name, const std::string& text) const {  // returns its path
         write_bytes(*this / name, Bytes(text.begin(), text.end()));
+        return (*this / name).string();
     }
     std::string read(const std::string& name) const {
         std::ifstream in(*this / name, std::ios::binary);
@@ -42,15 +63,19 @@ struct Folder : TemporaryFolder {
         return std::distance(Files(path()), Files());
     }
 
-    // program: a command that its arguments may follow; they may send its output elsewhere.
-    Outcome run(const std::string& arguments, const std::string& program = umbra) const {
-        const std::string there = "cd \"" + path().string() + "\" && ", said = " >stdout.txt 2>stderr.txt ";
-        const int raw = std::system((there + program + said + arguments).c_str());
-        const Outcome o{raw > 255 ? raw >> 8 : raw, read("stdout.txt"), read("stderr.txt"), read("framebuffer.tga"),
-                        read("depth.tga")};
-        std::filesystem::remove(*this / "stdout.txt");
-        std::filesystem::remove(*this / "stderr.txt");
+    // Runs it in the caller's folder; it may send its output elsewhere.
+    Outcome run_command(const std::string& command) const {
+        const std::string said = '"' + (*this / "stdout.txt").string() + '"',
+                          complained = '"' + (*this / "stderr.txt").string() + '"';
+        const int raw = std::system(('(' + command + ") >" + said + " 2>" + complained).c_str());
+        const Outcome o{raw > 255 ? raw >> 8 : raw,  // POSIX keeps it in the high byte
+                        read("stdout.txt"), read("stderr.txt"), read("framebuffer.tga"), read("depth.tga")};
+        for (const char* file : {"stdout.txt", "stderr.txt"}) std::filesystem::remove(*this / file);
         return o;
+    }
+    // Runs the program in this folder. program: a command that its arguments may follow.
+    Outcome run(const std::string& arguments, const std::string& program = umbra_command) const {
+        return run_command("cd \"" + path().string() + "\" && " + program + ' ' + arguments);
     }
 
     // Calls visit(x, y, bgr) for each pixel of framebuffer.tga and returns how many there are.
@@ -63,14 +88,26 @@ struct Folder : TemporaryFolder {
     }
 };
 
-inline long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
+// A run that failed: what the program wrote to standard error, and its status.
+struct ProgramFailed : std::runtime_error {
+    int status;
+    explicit ProgramFailed(const Outcome& o) : std::runtime_error(o.err), status(o.status) {}
+};
 
-// The number after the name in a line of names and values.
-inline long value(const std::string& line, const std::string& name) {
-    const std::size_t at = (' ' + line).find(' ' + name + ' ');
-    if (at == std::string::npos) throw std::runtime_error("no " + name + " in: " + line);
-    return std::stol(line.substr(at + name.size() + 1));
-}
+// A program that is judged, with a folder for its pictures and whatever else a run needs.
+struct Program : Folder {
+    std::string binary;
+    explicit Program(const std::string& path) : binary(path) {}
+
+    // Runs it in the caller's folder and returns what it says. Throws ProgramFailed.
+    std::string run(const Strings& arguments) const {
+        std::string command = quoted(binary);
+        for (const std::string& argument : joined(arguments, {"-o", path().string()}))
+            command += ' ' + quoted(argument);
+        const Outcome o = run_command(command);
+        return o.status == 0 ? o.out : throw ProgramFailed(o);
+    }
+};
 
 // The program must end with the status and one line that begins with its name and holds the text, say nothing else, and
 // leave the folder as it is.
