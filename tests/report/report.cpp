@@ -88,23 +88,22 @@ void predict_errors(const Program& umbra, const Strings& arguments, std::vector<
 }
 
 // A table of commas in columns: the first two, and those from `begin` up to `end`.
-void print_columns(const std::string& csv, int begin, int end) {
+void print_columns(std::string csv, std::size_t begin, std::size_t end) {
+    std::erase(csv, '"');
     std::istringstream lines(csv);
-    std::vector<std::vector<std::string>> rows;
-    std::vector<int> widths;
+    std::vector<Strings> rows;
+    std::vector<int> widths(end);
     for (std::string line, cell; std::getline(lines, line);) {
         std::istringstream cells(line);
-        std::vector<std::string>& row = rows.emplace_back();
-        for (int column = 0; std::getline(cells, cell, ','); column++) {
-            if (column >= 2 && (column < begin || column >= end)) continue;
-            std::erase(cell, '"');
+        Strings& row = rows.emplace_back();
+        while (row.size() < end && std::getline(cells, cell, ',')) {
+            widths[row.size()] = std::max(widths[row.size()], static_cast<int>(cell.size()));
             row.push_back(cell);
-            widths.resize(std::max(widths.size(), row.size()));
-            widths[row.size() - 1] = std::max(widths[row.size() - 1], static_cast<int>(cell.size()));
         }
     }
-    for (const auto& row : rows) {
-        for (std::size_t i = 0; i < row.size(); i++) std::printf(i < 1 ? "%-*s" : "  %*s", widths[i], row[i].c_str());
+    for (const Strings& row : rows) {
+        for (std::size_t i = 0; i < row.size(); i++)
+            if (i < 2 || i >= begin) std::printf(i < 1 ? "%-*s" : "  %*s", widths[i], row[i].c_str());
         std::puts("");
     }
 }
