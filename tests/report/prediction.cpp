@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "our_gl.h"
 #include "random.h"
@@ -14,26 +13,17 @@ double mean_distance(const Texel& texel) {
     return d / 6 + w * w / (12 * h) * std::log((h + d) / w) + h * h / (12 * w) * std::log((w + d) / h);
 }
 
-double Theory::wrong() const { return floor + 2 / std::numbers::pi * mean_needle * boundary_per_area; }
-
-Theory Theory::with_texels(double factor) const { return {floor, mean_needle * factor, boundary_per_area, deviation}; }
-
 Theorist::Theorist(RayCaster caster, const View& view, const vec3& to_light, int threads)
     : caster_(std::move(caster)), view_(view), to_light_(to_light), threads_(threads) {
     const mat4 m = lookat(to_light, {}, view.up);
     x_ = m[0].xyz(), y_ = m[1].xyz(), z_ = m[2].xyz();
+    low_ = high_ = seen(caster_.triangle(0)[0]);
     for (int f = 0; f < caster_.ntriangles(); f++)
-        for (const vec3& corner : caster_.triangle(f))
+        for (const vec3& corner : caster_.triangle(f)) {
+            const vec2 p = seen(corner);
+            for (int i = 0; i < 2; i++) low_[i] = std::min(low_[i], p[i]), high_[i] = std::max(high_[i], p[i]);
             for (int i = 0; i < 3; i++) size_ = std::max(size_, 2 * std::fabs(corner[i]));
-}
-
-Texel Theorist::fitted_texel(int size) const {
-    vec2 low = seen(caster_.triangle(0)[0]), high = low;
-    for (int f = 0; f < caster_.ntriangles(); f++)
-        for (const vec3& corner : caster_.triangle(f))
-            for (int i = 0; i < 2; i++)
-                low[i] = std::min(low[i], seen(corner)[i]), high[i] = std::max(high[i], seen(corner)[i]);
-    return {(high.x - low.x) / size, (high.y - low.y) / size};
+        }
 }
 
 // dark: the verdict on a point by the sample at the end of the needle.
@@ -71,13 +61,9 @@ Theory Theorist::theory(const Texel& texel, bool at_corner, int needles,
 
 Theory Theorist::derived_bias(const Texel& texel, int needles) const {
     // What a shadow buffer of endless resolution would hold: the surface nearest to the light. A height is towards it.
-    struct Front {
-        int face;
-        double height;
-    };
-    const auto front = [&](const vec2& p) -> Front {
+    const auto front = [&](const vec2& p) {  // its face and height
         const auto hit = caster_.first_hit(x_ * p.x + y_ * p.y + z_ * size_, -z_);
-        return hit ? Front{hit->triangle, dot(hit->point, z_)} : Front{-1, -std::numeric_limits<double>::infinity()};
+        return hit ? std::pair(hit->triangle, dot(hit->point, z_)) : std::pair(-1, -HUGE_VAL);
     };
     // A height is known to some ten roundings of numbers of the scene's size.
     const double rounding = 16 * size_ * std::numeric_limits<double>::epsilon();
@@ -86,13 +72,13 @@ Theory Theorist::derived_bias(const Texel& texel, int needles) const {
         const vec3 n = cross(t[1] - t[0], t[2] - t[0]);
         const vec2 sample = seen(hit.point) + needle, slope = seen(n) / -dot(n, z_);  // of the receiver, along x and y
         const double height = dot(hit.point, z_);
-        const Front above = front(sample);
-        if (above.face == hit.triangle || above.height <= height + dot(slope, needle) + rounding) return false;
-        double lowest = above.height;
+        const auto [face, above] = front(sample);
+        if (face == hit.triangle || above <= height + dot(slope, needle) + rounding) return false;
+        double lowest = above;
         for (const vec2& side : {vec2{texel.width, 0}, vec2{0, texel.height}}) {
-            const double a = front(sample + side).height, b = front(sample - side).height;
-            const double fall = std::min(std::fabs(above.height - a), std::fabs(above.height - b));
-            lowest -= a < above.height && b < above.height ? fall / 2 : fall;
+            const double a = front(sample + side).second, b = front(sample - side).second;
+            const double fall = std::min(std::fabs(above - a), std::fabs(above - b));
+            lowest -= a < above && b < above ? fall / 2 : fall;
         }
         return lowest > height + rounding;
     });

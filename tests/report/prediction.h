@@ -11,6 +11,7 @@
 // boundary is that of the shadow which the bias leaves; a needle that puts a wrong pixel right counts -1.
 #pragma once
 #include <functional>
+#include <numbers>
 
 #include "truth.h"
 
@@ -31,8 +32,10 @@ struct Theory {
     double boundary_per_area = 0;  // L/A, in one over the scene's unit
     double deviation = 0;          // of L/A as it was estimated, if crossings were independent
 
-    double wrong() const;                     // share of the facing pixels
-    Theory with_texels(double factor) const;  // the same boundary under texels larger by a factor
+    // The share of the facing pixels that is wrong.
+    double wrong() const { return floor + 2 / std::numbers::pi * mean_needle * boundary_per_area; }
+    // The same boundary under texels larger by a factor.
+    Theory with_texels(double factor) const { return {floor, mean_needle * factor, boundary_per_area, deviation}; }
 };
 
 // The theory of one scene. What it returns does not depend on the number of threads.
@@ -41,7 +44,7 @@ public:
     Theorist(RayCaster caster, const View& view, const vec3& to_light, int threads);
 
     // Of a buffer of size x size texels that all triangles just fit into.
-    Texel fitted_texel(int size) const;
+    Texel fitted_texel(int size) const { return {(high_.x - low_.x) / size, (high_.y - low_.y) / size}; }
 
     // A bias derived from the slopes: a point's plane is carried to the sample, the texel's centre; what is above it
     // there may be lower by what the nearest surface falls within a texel (along each axis the smaller of the two
@@ -64,5 +67,6 @@ private:
     vec3 to_light_;
     int threads_;
     vec3 x_, y_, z_;   // the scene as the light sees it; unit, z towards the light
+    vec2 low_, high_;  // what all triangles are within, along x and y
     double size_ = 0;  // of the scene: more than any height
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "chart.h"
 #include "check.h"
@@ -15,9 +16,7 @@ namespace {
 constexpr double pi = std::numbers::pi;
 
 Figures figures(const std::string& method, int size, double error, double ms) {
-    Figures f;
-    f.method = method, f.size = size, f.error = error, f.total_ms = ms;
-    return f;
+    return {.method = method, .size = size, .error = error, .total_ms = ms};
 }
 
 std::vector<Figures> example() {
@@ -85,10 +84,6 @@ TEST("the share of wrong pixels is counted over those that face the light and ar
     const TGAImage picture = image({0, 20, 20, 0, 90, 50, 50, 50, 30, 70});
     const TGAImage exact = image({9, 90, 90, 90, 90, 50, 53, 50, 34, 70});
     const PictureError found = compare(truth, picture, image({255, 0, 0, 0, 255, 255, 0, 255, 0, 255}), exact);
-    CHECK_EQ(found.coverage, 2);
-    CHECK_EQ(found.facing, 6);
-    CHECK_EQ(found.falsely_dark, 1);
-    CHECK_EQ(found.falsely_lit, 1);
     CHECK_NEAR(found.percent(), 100 / 3., 1e-12);
     CHECK_NEAR(found.rmse, std::sqrt(25 / 6.), 1e-12);
     CHECK_EQ(found.line(), std::string("coverage 2 facing 6 falsely_dark 1 falsely_dark_percent 16.6667 falsely_lit 1 "
@@ -98,9 +93,8 @@ TEST("the share of wrong pixels is counted over those that face the light and ar
     CHECK_THROWS(compare(truth, picture, TGAImage(5, 3, TGAImage::RGB), exact), "size");
 }
 TEST("the scene is read from umbra's arguments, and a copy of each model turns its normals to the light") {
-    const TemporaryFolder folder("report_test");
-    const std::string path = (folder / "far.obj").string();
-    std::ofstream(path) << "v 6 0 0\nv 10 0 0\nv 6 2 .1\nvn 0 0 -1\nf 1//1 2//1 3//1\n";
+    const Folder folder;
+    const std::string path = folder.write("far.obj", "v 6 0 0\nv 10 0 0\nv 6 2 .1\nvn 0 0 -1\nf 1//1 2//1 3//1\n");
     const Strings given{"--size", "30x20", "--light",  "0,3,4", "--shadow", "map",
                           "--eye",  "1,2,3", "--center", "0,0,1"};
     const Scene scene(joined(given, {path, "--quiet"}), folder);
@@ -154,10 +148,9 @@ TEST("ten times the error is as far at one end of the axis as at the other, and 
 }
 TEST("labels do not cover each other where methods are close in time") {
     std::vector<Figures> f;
-    const int sizes[] = {200, 400, 800, 1600, 3200, 6400};
     const double ms[] = {20, 20.4, 22, 30, 70, 260};
-    for (int i = 0; i < 6; i++) f.push_back(figures("shadow map", sizes[i], .8 / (1 << i), ms[i]));
-    for (int i = 0; i < 6; i++) f.push_back(figures("constant bias", sizes[i], .25 + 1.7 / (1 << i), ms[i] * .95));
+    for (int i = 0; i < 6; i++) f.push_back(figures("shadow map", 200 << i, .8 / (1 << i), ms[i]));
+    for (int i = 0; i < 6; i++) f.push_back(figures("constant bias", 200 << i, .25 + 1.7 / (1 << i), ms[i] * .95));
     f.push_back(figures("exact", 0, 0, 21));
     mark_frontier(f);
     const std::string text = svg(f, "", "");
@@ -178,9 +171,8 @@ TEST("labels do not cover each other where methods are close in time") {
 }
 TEST("a chart without methods, or with a time of zero, is refused") {
     CHECK_THROWS(svg({}, "", ""), "at least one");
-    CHECK_THROWS(svg({figures("m", 1, 1, 0)}, "", ""), "positive");
-    CHECK_THROWS(svg({figures("m", 1, -1, 1)}, "", ""), "positive");
-    CHECK_THROWS(svg({figures("m", 1, 1, NAN)}, "", ""), "positive");
+    for (const auto& [error, ms] : {std::pair(1., 0.), {-1, 1}, {1, NAN}})
+        CHECK_THROWS(svg({figures("m", 1, error, ms)}, "", ""), "positive");
     CHECK(!svg({figures("m", 1, 0, 3)}, "", "").empty());  // nothing but zeros
 }
 TEST("the mean distance in a rectangle is its integral; the error of the nearest texel is that of a square") {
@@ -201,11 +193,8 @@ TEST("a fitted texel is a share of what the light sees") {
     CHECK_NEAR(t.height, .4, 1e-15);
 }
 TEST("needles of any shape measure the boundary of a round shadow, on a flat floor cut into few squares or many") {
-    struct Case {
-        int squares, needles;
-        Texel texel;
-    };
-    for (const auto& [n, needles, texel] : {Case{1, 8, {.03, .03}}, {60, 8, {.03, .03}}, {1, 16, {.01, .05}}}) {
+    for (const auto& [n, needles, texel] :
+         {std::tuple(1, 8, Texel{.03, .03}), {60, 8, {.03, .03}}, {1, 16, {.01, .05}}}) {
         const Theory t = Theorist(disk_over(floor_mesh(n, 0)), from_above, light, 2).derived_bias(texel, needles);
         CHECK_EQ(t.floor, 0);
         CHECK(t.deviation < .03 * circle_per_area);
