@@ -6,8 +6,9 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
-#include <iterator>
 #include <stdexcept>
+
+#include "geometry.h"
 
 namespace {
 
@@ -53,10 +54,6 @@ struct LogAxis {
     }
 };
 
-struct Place {
-    double x, y;
-};
-
 // A method's look: told apart by shape and dashes as well, for print without colour and for every eye.
 constexpr int looks = 4;
 constexpr const char* dashes[looks] = {"none", "7 4", "2 3", "10 3 2 3"};
@@ -64,11 +61,11 @@ constexpr const char* outlines[looks] = {  // of marks, around (0,0)
     "M-5 0 a5 5 0 1 0 10 0 a5 5 0 1 0 -10 0", "M-4.5 -4.5 h9 v9 h-9 z", "M0 -7 L7 0 0 7 -7 0 z",
     "M0 -6.5 L6 4.5 -6 4.5 z"};
 
-std::string text(const Place& p, const std::string& kind, const std::string& what) {
+std::string text(const vec2& p, const std::string& kind, const std::string& what) {
     return format("<text x='%.1f' y='%.1f' class='%s'>", p.x, p.y, kind.c_str()) + escaped(what) + "</text>\n";
 }
 std::string path(const char* kind, const std::string& d) { return format("<path class='%s' d='", kind) + d + "'/>\n"; }
-std::string coordinates(const Place& p) { return format(" %.1f %.1f", p.x, p.y); }
+std::string coordinates(const vec2& p) { return format(" %.1f %.1f", p.x, p.y); }
 
 // Dark on light, and light on dark where the reader's screen is dark; on paper always the former. No custom properties:
 // not every converter knows them.
@@ -99,12 +96,11 @@ svg { color: #1b1f24 } .paper { fill: #fff } .grid { stroke: #dfe3e7 } .pale { s
 }  // namespace
 
 void mark_frontier(std::vector<Figures>& figures) {
-    for (Figures& f : figures) {
+    for (Figures& f : figures)
         f.frontier = f.rival && std::none_of(figures.begin(), figures.end(), [&](const Figures& g) {
                          return g.rival && g.error <= f.error && g.total_ms <= f.total_ms &&
                                 (g.error < f.error || g.total_ms < f.total_ms);
                      });
-    }
 }
 
 std::string csv(const std::vector<Figures>& figures) {
@@ -123,9 +119,8 @@ std::string csv(const std::vector<Figures>& figures) {
     return out;
 }
 
-std::string svg(const std::vector<Figures>& figures, const std::string& title, const std::string& subtitle) {
-    std::vector<Figures> rivals;
-    std::copy_if(figures.begin(), figures.end(), std::back_inserter(rivals), [](const Figures& f) { return f.rival; });
+std::string svg(std::vector<Figures> rivals, const std::string& title, const std::string& subtitle) {
+    std::erase_if(rivals, [](const Figures& f) { return !f.rival; });
     if (rivals.empty()) throw std::invalid_argument("a chart needs at least one method");
     double fastest = INFINITY, slowest = 0, best = INFINITY, worst = 0;
     for (const Figures& f : rivals) {
@@ -136,7 +131,7 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
     }
     if (worst == 0) best = worst = 1;  // nothing but zeros: any axis will do
     const LogAxis x(fastest, slowest, left, right), y(best, worst, floor_y, top);
-    const auto place = [&](const Figures& f) { return Place{x(f.total_ms), f.error > 0 ? y(f.error) : zero_y}; };
+    const auto place = [&](const Figures& f) { return vec2{x(f.total_ms), f.error > 0 ? y(f.error) : zero_y}; };
 
     std::string out =
         format("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %g %g' width='%g' height='%g' role='img'>\n",
@@ -161,14 +156,14 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
            "pixels wrong, % of those that face the light (logarithmic)</text>\n";
 
     // The efficient frontier: the least error that is to be had in a time, hence a staircase.
-    std::vector<Place> steps;
+    std::vector<vec2> steps;
     for (const Figures& f : rivals)
         if (f.frontier) steps.push_back(place(f));
     std::sort(steps.begin(), steps.end(),
-              [](const Place& a, const Place& b) { return a.x != b.x ? a.x < b.x : a.y > b.y; });
+              [](const vec2& a, const vec2& b) { return a.x != b.x ? a.x < b.x : a.y > b.y; });
     if (!steps.empty()) {
         std::string stairs = "M" + coordinates(steps[0]);
-        for (const Place& p : steps) stairs += format(" H%.1f V%.1f", p.x, p.y);
+        for (const vec2& p : steps) stairs += format(" H%.1f V%.1f", p.x, p.y);
         out += path("pale", stairs + format(" H%g", right));
         out += text({steps.back().x + 16, steps.back().y - 10}, "quiet small", "efficient frontier");
     }
@@ -179,7 +174,7 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
     int look = 0;
     for (std::size_t i = 0; i < rivals.size(); i++) {
         const Figures& f = rivals[i];
-        const Place p = place(f);
+        const vec2 p = place(f);
         const bool first = i == 0 || rivals[i - 1].method != f.method,
                    last = i + 1 == rivals.size() || rivals[i + 1].method != f.method;
         if (first) run = "M";
@@ -195,7 +190,7 @@ std::string svg(const std::vector<Figures>& figures, const std::string& title, c
         if (!last) continue;
         out += path(format("line line%d", look).c_str(), run);
         words +=
-            text(first ? Place{p.x - 14, p.y + 5} : Place{p.x, p.y + (below ? 28 : -20)}, "name end" + ink, f.method);
+            text(first ? vec2{p.x - 14, p.y + 5} : vec2{p.x, p.y + (below ? 28 : -20)}, "name end" + ink, f.method);
         look = (look + 1) % looks;
     }
     out += marks + words;

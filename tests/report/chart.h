@@ -30,4 +30,4 @@ std::string csv(const std::vector<Figures>& figures);
 
 // The rivals, methods in the order of their first figures; sizes along a line. Throws std::invalid_argument without
 // any, and for a time that is not positive or an error that is negative.
-std::string svg(const std::vector<Figures>& figures, const std::string& title, const std::string& subtitle);
+std::string svg(std::vector<Figures> figures, const std::string& title, const std::string& subtitle);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <map>
 #include <thread>
 
@@ -25,26 +24,23 @@ static void write_copy(const std::filesystem::path& path, const Model& model, co
 
 Scene::Scene(const Strings& arguments, const TemporaryFolder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
-    const auto vector = [](vec3& v) {
-        return [&v](const char* s) { std::sscanf(s, "%lf,%lf,%lf", &v.x, &v.y, &v.z); };
-    };
-    std::map<std::string, std::function<void(const char*)>> with_value = {
-        {"--size", [&](const char* s) { std::sscanf(s, "%dx%d", &view.width, &view.height); }},
-        {"--threads", [&](const char* s) { threads = std::atoi(s); }}};
-    with_value["--eye"] = vector(view.eye), with_value["--center"] = vector(view.center);
-    with_value["--up"] = vector(view.up), with_value["--light"] = vector(light);
-    for (const char* other : {"-o", "--shadow-size", "--shadow", "--bias", "--draw"})
-        with_value[other] = [](const char*) {};
+    std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
+    for (const char* option : {"-o", "--size", "--shadow-size", "--eye", "--center", "--up", "--light", "--shadow",
+                               "--bias", "--draw", "--threads"})
+        values[option];
     bool fit = true;
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
-        const auto option = with_value.find(*arg);
-        const bool is_path = option == with_value.end() && (arg->size() < 2 || arg->front() != '-');
+        const auto option = values.find(*arg);
+        const bool is_path = option == values.end() && (arg->size() < 2 || arg->front() != '-');
         (is_path ? paths : towards_light).push_back(*arg);
         if (*arg == "--no-fit") fit = false;
-        if (option == with_value.end()) continue;
-        option->second((++arg)->c_str());
-        towards_light.push_back(*arg);
+        if (option != values.end()) towards_light.push_back(option->second = *++arg);
     }
+    std::sscanf(values["--size"].c_str(), "%dx%d", &view.width, &view.height);
+    std::sscanf(values["--threads"].c_str(), "%d", &threads);
+    for (const auto& [option, v] : {std::pair("--eye", &view.eye), {"--center", &view.center}, {"--up", &view.up},
+                                    {"--light", &light}})
+        std::sscanf(values[option].c_str(), "%lf,%lf,%lf", &v->x, &v->y, &v->z);
     if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     for (const std::string& path : paths) {
         Model& model = models.emplace_back(path);
