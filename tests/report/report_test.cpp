@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <regex>
 #include <tuple>
 
 #include "chart.h"
@@ -29,16 +30,10 @@ std::vector<Figures> example() {
     return all;
 }
 
-// Where a text begins in another, once for each time.
-std::vector<std::size_t> occurrences(const std::string& text, const std::string& of) {
-    std::vector<std::size_t> all;
-    for (std::size_t at = text.find(of); at != std::string::npos; at = text.find(of, at + 1)) all.push_back(at);
-    return all;
-}
-
-// The number that follows the first `name` after `from`.
-double number_after(const std::string& text, const std::string& name, std::size_t from) {
-    return std::stod(text.substr(text.find(name, from) + name.size()));
+// The places of a text that a pattern matches, with what stands in its brackets there.
+std::vector<std::smatch> matches(const std::string& text, const std::string& pattern) {
+    const std::regex wanted(pattern);
+    return {std::sregex_iterator(text.begin(), text.end(), wanted), {}};
 }
 
 const vec3 light{.3, 1, .2};
@@ -119,9 +114,9 @@ TEST("a table of commas has the same number of fields in every line") {
     auto all = example();
     all[1].prediction = Figures::Prediction{.1, .2436, .0025, 5, .4, .41, .01};
     const std::string text = csv(all);
-    const std::size_t commas = occurrences(text.substr(0, text.find('\n')), ",").size();
-    CHECK_EQ(occurrences(text, "\n").size(), all.size() + 1);
-    CHECK_EQ(occurrences(text, ",").size(), commas * (all.size() + 1));
+    const std::size_t commas = matches(text.substr(0, text.find('\n')), ",").size();
+    CHECK_EQ(matches(text, "\n").size(), all.size() + 1);
+    CHECK_EQ(matches(text, ",").size(), commas * (all.size() + 1));
     CHECK(text.find("\"map\",200,0.0000,0.0000,2.0000,") != std::string::npos);
     CHECK(text.find(",0.1000,0.2436,0.002500,5.0000,0.4000,0.4100,0.0100\n") != std::string::npos);
     CHECK(text.find("\"exact\",,0.0000,") != std::string::npos);
@@ -132,7 +127,7 @@ TEST("the chart shows every rival, names every line, and rings the frontier") {
                                       {1, ">map<"}, {1, ">flat<"}, {1, ">exact<"}, {1, ">efficient frontier<"},
                                       {2, ">6400<"}, {0, ">off<"}, {2, "a &#60; b &#38; &#34;c&#34;"}, {0, "nan"},
                                       {0, "inf"}, {1, "prefers-color-scheme: dark"}})
-        if (!CHECK_EQ(occurrences(text, what).size(), static_cast<std::size_t>(times)))
+        if (!CHECK_EQ(matches(text, what).size(), static_cast<std::size_t>(times)))
             std::cerr << "    " << what << '\n';
 }
 TEST("ten times the error is as far at one end of the axis as at the other, and zero is below it") {
@@ -140,8 +135,8 @@ TEST("ten times the error is as far at one end of the axis as at the other, and 
     for (const double error : {10., 1., .1, 0.}) f.push_back(figures("m", 0, error, 10));
     const std::string text = svg(f, "", "");
     std::vector<double> y;
-    for (const std::size_t at : occurrences(text, "<path class='mark"))
-        y.push_back(number_after(text, " ", text.find("translate(", at)));
+    for (const std::smatch& mark : matches(text, "<path class='mark.*translate\\(.* (.*)\\)"))
+        y.push_back(std::stod(mark[1]));
     if (!CHECK_EQ(y.size(), std::size_t{4})) return;
     CHECK_NEAR(y[1] - y[0], y[2] - y[1], .11);  // written with one decimal
     CHECK(y[1] > y[0] && y[3] > y[2]);
@@ -158,11 +153,9 @@ TEST("labels do not cover each other where methods are close in time") {
         double x, y, width;
     };
     std::vector<Label> labels;
-    for (const std::size_t at : occurrences(text, "class='small")) {
-        const std::size_t start = text.rfind("<text", at), digits = text.find("</text>", at) - text.find('>', at) - 1;
-        const double width = 6.4 * static_cast<double>(digits), x = number_after(text, "x='", start);
-        labels.push_back(
-            {text.compare(at, 16, "class='small end") == 0 ? x - width : x, number_after(text, "y='", start), width});
+    for (const std::smatch& label : matches(text, "x='(.*)' y='(.*)' class='small( end)?.*>(.*)</text>")) {
+        const double width = 6.4 * static_cast<double>(label[4].length()), x = std::stod(label[1]);
+        labels.push_back({label[3].matched ? x - width : x, std::stod(label[2]), width});
     }
     CHECK_EQ(labels.size(), std::size_t{12});
     for (const Label& a : labels)

@@ -78,8 +78,7 @@ struct Corners {
         }
     }
     // place: of the corner i on the light's screen. The exact one: [low,high] taken to `side` pixels from `from` on.
-    template <class Place>
-    double worst(Place&& place, const vec<3, real>& low, const vec<3, real>& high, real from, real side) const {
+    double worst(const auto& place, const vec<3, real>& low, const vec<3, real>& high, real from, real side) const {
         double worst = 0;
         for (std::size_t i = 0; i < at.size(); i++) {
             const auto off = [&](int k) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <regex>
 
 using Strings = std::vector<std::string>;
 
@@ -18,17 +19,12 @@ inline Strings joined(Strings a, const Strings& b) {
 // The text once for each value, which takes the place of every %.
 inline Strings each(const std::string& text, const Strings& values) {
     Strings all;
-    for (const std::string& value : values) {
-        all.emplace_back();
-        for (const char c : text) all.back() += c == '%' ? value : std::string(1, c);
-    }
+    for (const std::string& value : values) all.push_back(std::regex_replace(text, std::regex("%"), value));
     return all;
 }
 
 inline std::string quoted(const std::string& argument) {  // for a POSIX shell
-    std::string out = "'";
-    for (const char c : argument) out += c == '\'' ? "'\\''" : std::string(1, c);
-    return out + "'";
+    return '\'' + std::regex_replace(argument, std::regex("'"), "'\\''") + '\'';
 }
 
 inline long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
@@ -79,8 +75,7 @@ struct Folder : TemporaryFolder {
     }
 
     // Calls visit(x, y, bgr) for each pixel of framebuffer.tga and returns how many there are.
-    template <class Visit>
-    long each_pixel(const Visit& visit) const {
+    long each_pixel(const auto& visit) const {
         const TGAImage image = TGAImage::read_tga_file(*this / "framebuffer.tga");
         for (int y = 0; y < image.height(); y++)
             for (int x = 0; x < image.width(); x++) visit(x, y, image.pixel(x, y));
