@@ -7,22 +7,21 @@
 #include <map>
 #include <thread>
 
+#include "scenes.h"
+
 // The same faces in the same order.
-static void write_copy(const std::filesystem::path& path, const Model& model, const vec3& n) {
-    std::ofstream out(path);
-    out.precision(17);  // gives the same double back
-    out << "vn " << n.x << ' ' << n.y << ' ' << n.z << '\n';
+static std::string copy_of(const Model& model, const vec3& n) {
+    Obj copy;
+    std::string faces = "vn " + number(n.x) + ' ' + number(n.y) + ' ' + number(n.z) + '\n';
     for (int face = 0; face < model.nfaces(); face++) {
-        for (int c = 0; c < 3; c++) {
-            const vec3& v = model.vert(face, c);
-            out << "v " << v.x << ' ' << v.y << ' ' << v.z << '\n';
-        }
-        out << "f -3//1 -2//1 -1//1\n";
+        faces += 'f';
+        for (int c = 0; c < 3; c++) faces += ' ' + std::to_string(copy.vertex(model.vert(face, c))) + "//1";
+        faces += '\n';
     }
-    if (!out.flush()) throw std::runtime_error(path.string() + ": cannot write");
+    return copy.text() + faces;
 }
 
-Scene::Scene(const Strings& arguments, const TemporaryFolder& folder)
+Scene::Scene(const Strings& arguments, const Folder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
     for (const char* option : {"-o", "--size", "--shadow-size", "--eye", "--center", "--up", "--light", "--shadow",
@@ -44,8 +43,8 @@ Scene::Scene(const Strings& arguments, const TemporaryFolder& folder)
     if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     for (const std::string& path : paths) {
         Model& model = models.emplace_back(path);
-        towards_light.push_back((folder / ("copy" + std::to_string(models.size()) + ".obj")).string());
-        write_copy(towards_light.back(), model, normalized(light));
+        const std::string name = "copy" + std::to_string(models.size()) + ".obj";
+        towards_light.push_back(folder.write(name, copy_of(model, normalized(light))));
         if (fit) model.fit();
         model.move(-view.center);
     }

@@ -16,7 +16,7 @@ struct Scene {
     Strings towards_light;  // the arguments once more, with copies of the models whose normals all point to the light
 
     // Of arguments that the program accepts; the copies are written into the folder. Throws what Model does.
-    Scene(const Strings& arguments, const TemporaryFolder& folder);
+    Scene(const Strings& arguments, const Folder& folder);
 };
 
 struct PictureError {

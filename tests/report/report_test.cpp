@@ -164,8 +164,8 @@ TEST("labels do not cover each other where methods are close in time") {
 }
 TEST("a chart without methods, or with a time of zero, is refused") {
     CHECK_THROWS(svg({}, "", ""), "at least one");
-    for (const auto& [error, ms] : {std::pair(1., 0.), {-1, 1}, {1, NAN}})
-        CHECK_THROWS(svg({figures("m", 1, error, ms)}, "", ""), "positive");
+    for (const Figures& wrong : {figures("m", 1, 1, 0), figures("m", 1, -1, 1), figures("m", 1, 1, NAN)})
+        CHECK_THROWS(svg({wrong}, "", ""), "positive");
     CHECK(!svg({figures("m", 1, 0, 3)}, "", "").empty());  // nothing but zeros
 }
 TEST("the mean distance in a rectangle is its integral; the error of the nearest texel is that of a square") {

@@ -157,14 +157,12 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
                });
 
     family("two layers apart by", "the rear one seen: %", 0, {1e-2, 1e-4, 1e-6, 1.3e-7, 1e-8, 1e-9}, [&](double gap) {
-        std::string text = "vn 0 0 1\nvn 1 0 0\n";  // they look to different sides
-        for (const std::string layer : {"1", "2"}) {
+        Obj scene;
+        for (const double z : {0., gap})
             for (const vec2& at : {vec2{-2, -2}, {6, -2}, {-2, 6}})
-                text += "v " + number(at.x) + ' ' + number(at.y) + ' ' +
-                        number(.077 + .037 * (at.x + at.y) + (layer == "2" ? gap : 0)) + '\n';
-            text += "f -3//" + layer + " -2//" + layer + " -1//" + layer + '\n';
-        }
-        const std::string path = umbra.write("scene.obj", text);
+                scene.vertex({at.x, at.y, .077 + .037 * (at.x + at.y) + z});
+        const std::string faces = "vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 4//2 5//2 6//2\n";  // to different sides
+        const std::string path = umbra.write("scene.obj", scene.text() + faces);
         umbra.run({"--size", "100x100", "--no-fit", "--eye", "0,0,4", "--draw", "normal", path});
         int rear = 0;
         umbra.each_pixel([&](int, int, const std::uint8_t* bgr) { rear += bgr[0] == 255; });  // towards the viewer

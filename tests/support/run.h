@@ -27,7 +27,7 @@ inline std::string quoted(const std::string& argument) {  // for a POSIX shell
     return '\'' + std::regex_replace(argument, std::regex("'"), "'\\''") + '\'';
 }
 
-inline long lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
+inline auto lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
 
 // The number after the name in a line of names and values.
 inline double value(const std::string& line, const std::string& name) {
@@ -54,7 +54,7 @@ struct Folder : TemporaryFolder {
         std::ifstream in(*this / name, std::ios::binary);
         return {std::istreambuf_iterator<char>(in), {}};
     }
-    long files() const {
+    auto files() const {
         using Files = std::filesystem::directory_iterator;
         return std::distance(Files(path()), Files());
     }
@@ -107,7 +107,7 @@ struct Program : Folder {
 // The program must end with the status and one line that begins with its name and holds the text, say nothing else, and
 // leave the folder as it is.
 inline void check_refused(const Folder& f, const std::string& arguments, int status, const std::string& text) {
-    const long files = f.files();
+    const auto files = f.files();
     const std::string frame = f.read("framebuffer.tga"), depth = f.read("depth.tga");
     const Outcome o = f.run(arguments);
     const bool named = o.err.rfind("umbra: ", 0) == 0 && o.err.find(text) != std::string::npos;
