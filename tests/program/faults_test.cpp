@@ -170,13 +170,12 @@ TEST("a file that cannot grow is one error line; a run that ends there leaves wh
 #ifdef __linux__
 // A disk of 1 MiB that only this process and its children see. Not everyone may mount one.
 static bool mount_small_disk(const fs::path& at) {
-    const auto write = [](const char* file, const std::string& text) {
-        return static_cast<bool>(std::ofstream(file) << text << std::flush);
-    };
     const std::string user = "0 " + std::to_string(geteuid()) + " 1", group = "0 " + std::to_string(getegid()) + " 1";
     const bool apart = unshare(CLONE_NEWNS) == 0 ||
-                       (unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0 && write("/proc/self/setgroups", "deny") &&
-                        write("/proc/self/uid_map", user) && write("/proc/self/gid_map", group));
+                       (unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0 &&
+                        std::ofstream("/proc/self/setgroups") << "deny" << std::flush &&
+                        std::ofstream("/proc/self/uid_map") << user << std::flush &&
+                        std::ofstream("/proc/self/gid_map") << group << std::flush);
     return apart && mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
            mount("tmpfs", at.c_str(), "tmpfs", 0, "size=1048576") == 0;
 }

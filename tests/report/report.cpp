@@ -38,8 +38,7 @@ std::vector<Figures> methods() {
         for (const int size : {200, 400, 800, 1600, 3200, 6400})
             all.push_back({name, size, joined(arguments, {"--shadow-size", std::to_string(size)})});
     all.push_back({"exact", 0, {"--shadow", "exact"}});
-    all.push_back({"off", 0, {"--shadow", "off"}});
-    all.back().rival = false;
+    all.push_back({.method = "off", .arguments = {"--shadow", "off"}, .rival = false});
     return all;
 }
 
