@@ -58,11 +58,13 @@ public:
         text_.str("");
         vertices_ = uvs_ = normals_ = 0;
     }
-    void use(const std::string& material) { text_ << "usemtl " << material << '\n'; }
 
+    // Every shape begins with the name of its material, "" for none.
+    //
     // A polygon that shares no vertices, and so no normals either; counter-clockwise where its front is seen.
-    void polygon(const std::vector<vec3>& corners, const std::vector<vec2>& uvs = {},
+    void polygon(const std::string& material, const std::vector<vec3>& corners, const std::vector<vec2>& uvs = {},
                  const std::vector<vec3>& normals = {}) {
+        use(material);
         std::ostringstream face;
         for (std::size_t i = 0; i < corners.size(); i++) {
             face << ' ' << vertex(corners[i]);
@@ -72,25 +74,26 @@ public:
         text_ << 'f' << face.str() << '\n';
     }
     // A quadrangle whose texture coordinates run from LOW at its first corner to HIGH at its third, the opposite one.
-    void quad(const vec3& a, const vec3& b, const vec3& c, const vec3& d, const vec2& low = {0, 0},
-              const vec2& high = {1, 1}) {
-        polygon({a, b, c, d}, {low, {high.x, low.y}, high, {low.x, high.y}});
+    void quad(const std::string& material, const vec3& a, const vec3& b, const vec3& c, const vec3& d,
+              const vec2& low = {0, 0}, const vec2& high = {1, 1}) {
+        polygon(material, {a, b, c, d}, {low, {high.x, low.y}, high, {low.x, high.y}});
     }
     // Six quads, seen from outside, or from inside where LOW and HIGH are exchanged.
-    void box(const vec3& low, const vec3& high) {
+    void box(const std::string& material, const vec3& low, const vec3& high) {
         const auto at = [&](int x, int y, int z) {
             return vec3{x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z};
         };
-        quad(at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1));
-        quad(at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0));
-        quad(at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1));
-        quad(at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0));
-        quad(at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0));
-        quad(at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1));
+        quad(material, at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1));
+        quad(material, at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0));
+        quad(material, at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1));
+        quad(material, at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0));
+        quad(material, at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0));
+        quad(material, at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1));
     }
     // An octahedron whose faces are cut into n*n triangles and blown up; vertices are shared, and no normals are given.
     // Texture coordinates are those of a projection along z.
-    void sphere(const vec3& center, double radius, int n) {
+    void sphere(const std::string& material, const vec3& center, double radius, int n) {
+        use(material);
         std::map<std::array<int, 3>, std::string> known;
         const auto corner = [&](int x, int y, int z) {
             std::string& it = known[{x, y, z}];
@@ -114,6 +117,9 @@ public:
     }
 
 private:
+    void use(const std::string& material) {
+        if (!material.empty()) text_ << "usemtl " << material << '\n';
+    }
     // Each writes a line and returns its number.
     std::string vertex(const vec3& p) { return line("v", p * size + offset, ++vertices_); }
     std::string normal(const vec3& n) { return line("vn", n, ++normals_); }
@@ -135,22 +141,32 @@ void check(const TGAImage& picture, const std::string& name) {
 }
 
 // A scene is a function that adds the models; what is drawn with the arguments must be the reference of the same name.
-#define SCENE(name, ...)                                                                                       \
-    static void name(Scene& s);                                                                                \
-    static const Registration registration_##name(#name, [] { check(Scene(name).draw(__VA_ARGS__), #name); }); \
+#define SCENE(name, ...)             \
+    static void name(Scene& s);      \
+    PICTURE(name, name, __VA_ARGS__) \
     static void name(Scene& s)
+
+// Another picture of a scene that there is.
+#define PICTURE(name, scene, ...) \
+    static const Registration registration_##name(#name, [] { check(Scene(scene).draw(__VA_ARGS__), #name); });
 
 TGAColor rgb(int r, int g, int b) {
     return {{static_cast<std::uint8_t>(b), static_cast<std::uint8_t>(g), static_cast<std::uint8_t>(r), 255}};
 }
 
+// A square picture: colour(x, y) is that of the pixel.
+template <class Colour>
+TGAImage painted(int size, const Colour& colour) {
+    TGAImage picture(size, size, TGAImage::RGB);
+    for (int y = 0; y < size; y++)
+        for (int x = 0; x < size; x++) picture.set(x, y, colour(x, y));
+    return picture;
+}
+
 // n x n squares of so many pixels each, the bottom-left one dark.
 TGAImage checkers(int n, int pixels, const TGAColor& dark = rgb(60, 70, 90),
                   const TGAColor& light = rgb(200, 200, 190)) {
-    TGAImage picture(n * pixels, n * pixels, TGAImage::RGB);
-    for (int y = 0; y < n * pixels; y++)
-        for (int x = 0; x < n * pixels; x++) picture.set(x, y, (x / pixels + y / pixels) % 2 ? light : dark);
-    return picture;
+    return painted(n * pixels, [&](int x, int y) { return (x / pixels + y / pixels) % 2 ? light : dark; });
 }
 
 // An F, which is like none of its mirror images and turns; each corner of the picture has its own colour:
@@ -166,39 +182,29 @@ TGAImage letter(const TGAColor& ink = rgb(20, 20, 20), const TGAColor& paper = r
                                     "r......g"};
     const std::map<char, TGAColor> colours{{'F', ink},              {'.', paper},           {'r', rgb(200, 30, 30)},
                                            {'g', rgb(30, 160, 30)}, {'b', rgb(30, 60, 200)}, {'y', rgb(200, 190, 30)}};
-    TGAImage picture(8, 8, TGAImage::RGB);
-    for (int y = 0; y < 8; y++)
-        for (int x = 0; x < 8; x++) picture.set(x, y, colours.at(rows[7 - y][x]));
-    return picture;
+    return painted(8, [&](int x, int y) { return colours.at(rows[7 - y][x]); });
 }
 
 // A normal map of n x n domes, of so many texels each. I, J and K are where the texture's u, its v and its front point:
 // those of the face for a map in object space, the axes themselves for one in tangent space.
 TGAImage domes(int n, int texels, const vec3& i = {1, 0, 0}, const vec3& j = {0, 1, 0}, const vec3& k = {0, 0, 1}) {
-    TGAImage map(n * texels, n * texels, TGAImage::RGB);
     const auto encoded = [](double c) { return static_cast<int>((c + 1) * 127.5 + .5); };
-    for (int y = 0; y < n * texels; y++)
-        for (int x = 0; x < n * texels; x++) {
-            // -1 to 1 over the cell; the dome's rim is at .8, where its slope is 60 degrees
-            const double a = (2 * (x % texels) + 1. - texels) / texels, b = (2 * (y % texels) + 1. - texels) / texels;
-            const double r = std::sqrt(a * a + b * b) / .8, lean = .87 / .8;
-            const vec3 t = r < 1 ? vec3{a * lean, b * lean, std::sqrt(1 - .87 * .87 * r * r)} : vec3{0, 0, 1};
-            const vec3 normal = i * t.x + j * t.y + k * t.z;
-            map.set(x, y, rgb(encoded(normal.x), encoded(normal.y), encoded(normal.z)));
-        }
-    return map;
+    return painted(n * texels, [&](int x, int y) {
+        // -1 to 1 over the cell; the dome's rim is at .8, where its slope is 60 degrees
+        const double a = (2 * (x % texels) + 1. - texels) / texels, b = (2 * (y % texels) + 1. - texels) / texels;
+        const double r = std::sqrt(a * a + b * b) / .8, lean = .87 / .8;
+        const vec3 t = r < 1 ? vec3{a * lean, b * lean, std::sqrt(1 - .87 * .87 * r * r)} : vec3{0, 0, 1};
+        const vec3 normal = i * t.x + j * t.y + k * t.z;
+        return rgb(encoded(normal.x), encoded(normal.y), encoded(normal.z));
+    });
 }
 
 // What most scenes about shadows show: a floor, a ball, a block, and a board that stands on edge. It fits in [-1,1]^3.
 void add_yard(Scene& s) {
-    s.use("white");
-    s.box({-1, -.6, -1}, {1, -.5, 1});
-    s.use("red");
-    s.sphere({-.4, -.1, .35}, .4, 12);
-    s.use("blue");
-    s.box({.15, -.5, -.65}, {.6, .6, -.35});
-    s.use("yellow");
-    s.box({.45, -.5, .2}, {.52, .05, .8});
+    s.box("white", {-1, -.6, -1}, {1, -.5, 1});
+    s.sphere("red", {-.4, -.1, .35}, .4, 12);
+    s.box("blue", {.15, -.5, -.65}, {.6, .6, -.35});
+    s.box("yellow", {.45, -.5, .2}, {.52, .05, .8});
 }
 
 }  // namespace
@@ -217,16 +223,15 @@ SCENE(edge_rule, "--size 96x96 --shadow off --no-fit --eye 0,0,4 --light 0,0,1")
                     const auto at = [&](int i, int j) {
                         return vec3{(8 * (x + i) - 35.5) / 36, (8 * (y + j) - 35.5) / 36, 0};
                     };
-                    s.use(colour == 0 ? (half == 0 ? "red" : "dark_red") : (half == 0 ? "blue" : "dark_blue"));
-                    if (half == 0) s.polygon({at(0, 0), at(1, 0), at(1, 1)});
-                    else s.polygon({at(0, 0), at(1, 1), at(0, 1)});
+                    if (half == 0) s.polygon(colour ? "blue" : "red", {at(0, 0), at(1, 0), at(1, 1)});
+                    else s.polygon(colour ? "dark_blue" : "dark_red", {at(0, 0), at(1, 1), at(0, 1)});
                 }
 }
 
 // One quad from far in front of the eye to far behind it, just below the eye: the lowest pixels show what is a tenth of
 // the way to the centre.
 SCENE(near_plane, "--size 128x96 --shadow off --no-fit --eye .3,-.36,2 --center 0,-.5,0 --light .3,1,.5") {
-    s.quad({-8, -.5, 10}, {8, -.5, 10}, {8, -.5, -10}, {-8, -.5, -10}, {0, 0}, {32, 40});
+    s.quad("", {-8, -.5, 10}, {8, -.5, 10}, {8, -.5, -10}, {-8, -.5, -10}, {0, 0}, {32, 40});
     s.write("model_diffuse.tga", checkers(2, 4));
 }
 
@@ -236,9 +241,8 @@ SCENE(guard_band, "--size 96x96 --shadow off --no-fit --eye 0,0,4 --light 0,0,1"
     const vec2 corners[] = {{1, .13}, {.41, .91}, {-.57, .83}, {-1, -.21}, {-.33, -.94}, {.62, -.79}};
     const auto fan = [&](double size, double z, const std::array<const char*, 6>& colours) {
         for (std::size_t i = 0; i < 6; i++) {
-            s.use(colours[i]);
             const vec2 a = corners[i] * size, b = corners[(i + 1) % 6] * size;
-            s.polygon({{0, 0, z}, {a.x, a.y, z}, {b.x, b.y, z}});
+            s.polygon(colours[i], {{0, 0, z}, {a.x, a.y, z}, {b.x, b.y, z}});
         }
     };
     fan(30000, 0, {"red", "dark_red", "blue", "dark_blue", "white", "grey"});
@@ -247,22 +251,19 @@ SCENE(guard_band, "--size 96x96 --shadow off --no-fit --eye 0,0,4 --light 0,0,1"
 
 // 80 000 triangles, most of which hit no pixel's centre: no holes.
 SCENE(subpixel_triangles, "--size 64x64 --shadow off") {
-    s.use("green");
-    s.sphere({0, 0, 0}, 1, 100);
+    s.sphere("green", {0, 0, 0}, 1, 100);
 }
 
 // Three bars, each in front of the next one and behind the one before, and a triangle that all three run through.
 SCENE(depth_test, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
     const auto bar = [&](const char* colour, const vec3& from, const vec3& to) {
-        s.use(colour);
         const vec3 across = normalized(cross(to - from, vec3{0, 0, 1})) * .14;
-        s.polygon({from - across, from + across, to + across, to - across});
+        s.polygon(colour, {from - across, from + across, to + across, to - across});
     };
     bar("red", {-.9, -.5, -.5}, {.9, -.5, .5});
     bar("green", {.7, -.9, -.5}, {-.15, .9, .5});
     bar("blue", {.15, .9, -.5}, {-.7, -.9, .5});
-    s.use("yellow");
-    s.polygon({{-.55, .25, .2}, {0, -.8, -.2}, {.55, .2, .1}});
+    s.polygon("yellow", {{-.55, .25, .2}, {0, -.8, -.2}, {.55, .2, .1}});
 }
 
 // A box without a lid, seen into: the near walls show their fronts, the far ones and the bottom their backs. Its
@@ -270,8 +271,7 @@ SCENE(depth_test, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
 SCENE(back_faces, "--size 96x96 --shadow off --eye 1.5,3,3 --light .3,1,.5") {
     const vec3 l{.3, 1, .5};
     const auto wall = [&](const char* colour, const std::vector<vec3>& corners) {
-        s.use(colour);
-        s.polygon(corners, {}, {l, l, l, l});
+        s.polygon(colour, corners, {}, {l, l, l, l});
     };
     wall("red", {{-.8, -.5, .8}, {.8, -.5, .8}, {.8, .3, .8}, {-.8, .3, .8}});
     wall("cyan", {{.8, -.5, -.8}, {-.8, -.5, -.8}, {-.8, .3, -.8}, {.8, .3, -.8}});
@@ -282,27 +282,18 @@ SCENE(back_faces, "--size 96x96 --shadow off --eye 1.5,3,3 --light .3,1,.5") {
 
 // The eye is in a room: walls run past it on all sides.
 SCENE(eye_inside, "--size 128x96 --shadow off --eye .5,0,.7 --center -.1,-.2,-.5 --light .5,1,.8") {
-    s.use("white");
-    s.box({1, 1, 1}, {-1, -1, -1});
-    s.use("red");
-    s.box({-.6, -1, -.8}, {-.2, -.3, -.4});
+    s.box("white", {1, 1, 1}, {-1, -1, -1});
+    s.box("red", {-.6, -1, -.8}, {-.2, -.3, -.4});
     s.write("model_diffuse.tga", checkers(6, 4));
 }
 
 // Polygons for which a fan from the first corner would be wrong: a star, an arrow and a spiral, a face each.
 SCENE(concave_polygons, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
-    s.use("yellow");
-    std::vector<vec3> star;
-    constexpr double x[] = {0, .5878, .9511}, y[] = {1, .8090, .3090};  // sine and cosine of 0, 36 and 72 degrees
-    const vec2 turns[] = {{x[0], y[0]}, {-x[1], y[1]}, {-x[2], y[2]}, {-x[2], -y[2]}, {-x[1], -y[1]},
-                          {x[0], -y[0]}, {x[1], -y[1]}, {x[2], -y[2]}, {x[2], y[2]}, {x[1], y[1]}};
-    for (int i = 0; i < 10; i++)
-        star.push_back(vec3{turns[i].x, turns[i].y, 0} * (i % 2 ? .18 : .45) + vec3{-.5, .5, 0});
-    s.polygon(star);
-    s.use("red");
-    s.polygon({{.05, .1, 0}, {.5, .4, 0}, {.95, .1, 0}, {.5, .95, 0}});
-    s.use("cyan");
-    s.polygon({{-.9, -.95, 0}, {.9, -.95, 0}, {.9, -.1, 0}, {-.6, -.1, 0}, {-.6, -.65, 0}, {.5, -.65, 0},
+    s.polygon("yellow", {{-.5, .95, 0}, {-.605804, .64562, 0}, {-.927995, .63905, 0}, {-.671198, .44438, 0},
+                         {-.76451, .13595, 0}, {-.5, .32, 0}, {-.23549, .13595, 0},
+                         {-.328802, .44438, 0}, {-.072005, .63905, 0}, {-.394196, .64562, 0}});
+    s.polygon("red", {{.05, .1, 0}, {.5, .4, 0}, {.95, .1, 0}, {.5, .95, 0}});
+    s.polygon("cyan", {{-.9, -.95, 0}, {.9, -.95, 0}, {.9, -.1, 0}, {-.6, -.1, 0}, {-.6, -.65, 0}, {.5, -.65, 0},
                  {.5, -.4, 0}, {-.3, -.4, 0}, {-.3, -.3, 0}, {.65, -.3, 0}, {.65, -.8, 0}, {-.75, -.8, 0},
                  {-.75, 0, 0}, {-.9, 0, 0}});
 }
@@ -310,25 +301,22 @@ SCENE(concave_polygons, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
 // ---- where the viewer is ----
 
 // Five balls in a row, three in a column: a wide picture shows the row and a tall one the column, and balls are round.
-static void add_cross(Scene& s) {
+SCENE(wide, "--size 192x48 --shadow off --no-fit --eye 0,0,12 --light 1,1,1") {
     for (const int i : {-2, -1, 0, 1, 2}) {
-        s.use(i == 0 ? "white" : "red");
-        s.sphere({1.6 * i, 0, 0}, .7, 10);
-        s.use("blue");
-        if (i != 0) s.sphere({0, 1.6 * i, 0}, .7, 10);
+        s.sphere(i == 0 ? "white" : "red", {1.6 * i, 0, 0}, .7, 10);
+        if (i != 0) s.sphere("blue", {0, 1.6 * i, 0}, .7, 10);
     }
 }
-SCENE(wide, "--size 192x48 --shadow off --no-fit --eye 0,0,12 --light 1,1,1") { add_cross(s); }
-SCENE(tall, "--size 48x192 --shadow off --no-fit --eye 0,0,12 --light 1,1,1") { add_cross(s); }
+PICTURE(tall, wide, "--size 48x192 --shadow off --no-fit --eye 0,0,12 --light 1,1,1")
 
 // The yard from behind: the block is on the left now.
-SCENE(from_behind, "--size 128x128 --shadow off --eye -1,1,-4 --light .5,1,-.6") { add_yard(s); }
+PICTURE(from_behind, add_yard, "--size 128x128 --shadow off --eye -1,1,-4 --light .5,1,-.6")
 
 // Not the origin but the card is looked at, and up is to the upper right: the card is in the middle and leans to the
 // left.
 SCENE(center_and_up, "--size 96x96 --shadow off --no-fit --eye 2,1,1 --center 2,1,-3 --up 1,2,0 --light 0,0,1") {
     const vec3 at{2, 1, -3};
-    s.quad(at + vec3{-.8, -.8, 0}, at + vec3{.8, -.8, 0}, at + vec3{.8, .8, 0}, at + vec3{-.8, .8, 0});
+    s.quad("", at + vec3{-.8, -.8, 0}, at + vec3{.8, -.8, 0}, at + vec3{.8, .8, 0}, at + vec3{-.8, .8, 0});
     s.write("model_diffuse.tga", letter());
 }
 
@@ -343,20 +331,20 @@ SCENE(fitted, "--size 128x128 --shadow-size 512 --eye 1,1.8,5 --light 1,1,.6") {
 
 // The F is upright and not mirrored; red is at the bottom left, green at the bottom right.
 SCENE(texture_orientation, "--size 96x96 --shadow off --eye .8,.5,4 --light 0,0,1") {
-    s.quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0});
+    s.quad("", {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0});
     s.write("model_diffuse.tga", letter());
 }
 
 // Texture coordinates from -1 to 3: 4 x 4 copies, all upright.
 SCENE(uv_wrap, "--size 128x128 --shadow off --eye 0,0,4 --light 0,0,1") {
-    s.quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1}, {3, 3});
+    s.quad("", {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1}, {3, 3});
     s.write("model_diffuse.tga", letter());
 }
 
 // A wall of two triangles, near on the left and far on the right. Its rows of squares run straight to one point; did
 // the texture ignore the perspective, they would bend at the diagonal.
 SCENE(perspective_uv, "--size 128x128 --shadow off --no-fit --eye 0,0,4 --light 1,.3,1") {
-    s.quad({-.9, -1, 2}, {1.2, -1, -5}, {1.2, 1, -5}, {-.9, 1, 2}, {0, 0}, {4, 1});
+    s.quad("", {-.9, -1, 2}, {1.2, -1, -5}, {1.2, 1, -5}, {-.9, 1, 2}, {0, 0}, {4, 1});
     s.write("model_diffuse.tga", checkers(8, 4));
 }
 
@@ -371,8 +359,7 @@ SCENE(materials, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
     const char* const names[] = {"plain", "textured", "tinted", "glowing"};
     for (int i = 0; i < 4; i++) {
         const double x = i % 2 - .95, y = i / 2 - .95;
-        s.use(names[i]);
-        s.quad({x, y, 0}, {x + .9, y, 0}, {x + .9, y + .9, 0}, {x, y + .9, 0});
+        s.quad(names[i], {x, y, 0}, {x + .9, y, 0}, {x + .9, y + .9, 0}, {x, y + .9, 0});
     }
 }
 
@@ -380,41 +367,33 @@ SCENE(materials, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
 
 // A coarse ball without normals: its outline has corners, its shading has none.
 SCENE(smooth_normals, "--size 96x96 --shadow off --light 1,1,1") {
-    s.use("grey");
-    s.sphere({0, 0, 0}, 1, 3);
+    s.sphere("grey", {0, 0, 0}, 1, 3);
 }
 
 // A flat square whose normals lean outwards: it looks like a cushion.
 SCENE(given_normals, "--size 96x96 --shadow off --eye 0,0,4 --light 1,1,1") {
-    s.use("grey");
-    s.polygon({{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {},
+    s.polygon("grey", {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {},
               {{-1, -1, .7}, {1, -1, .7}, {1, 1, .7}, {-1, 1, .7}});
 }
 
-// Where a tilted card's texture and its front point.
-static constexpr vec3 card_u{.8, 0, -.6}, card_v{0, 1, 0}, card_front{.6, 0, .8};
-static constexpr const char* card_view = "--size 96x96 --shadow off --eye 0,0,4 --light -1,1,1";
-static void add_tilted_card(Scene& s) {
-    s.use("white");
-    s.quad((-card_u - card_v), (card_u - card_v), (card_u + card_v), (-card_u + card_v));
-}
-
 // Domes on a tilted card, lit from the upper left: bright there, dark at the lower right.
+static constexpr const char* card_view = "--size 96x96 --shadow off --eye 0,0,4 --light -1,1,1";
 SCENE(object_normal_map, card_view) {
-    add_tilted_card(s);
-    s.write("model_nm.tga", domes(3, 32, card_u, card_v, card_front));
+    const vec3 u{.8, 0, -.6}, v{0, 1, 0}, front{.6, 0, .8};
+    s.quad("white", -u - v, u - v, u + v, -u + v);
+    s.write("model_nm.tga", domes(3, 32, u, v, front));
 }
 
 // The same domes in tangent space: up to the rounding of the map it is the same picture.
 SCENE(tangent_normal_map, card_view) {
-    add_tilted_card(s);
+    object_normal_map(s);
+    fs::remove(s / "model_nm.tga");
     s.write("model_nm_tangent.tga", domes(3, 32));
 }
 
 // Where a model has both maps, --tangent takes the other one: here it is flat.
 SCENE(tangent_option, "--tangent --size 96x96 --shadow off --eye 0,0,4 --light -1,1,1") {
-    add_tilted_card(s);
-    s.write("model_nm.tga", domes(3, 32, card_u, card_v, card_front));
+    object_normal_map(s);
     s.write("model_nm_tangent.tga", domes(1, 32));
 }
 
@@ -422,7 +401,7 @@ SCENE(tangent_option, "--tangent --size 96x96 --shadow off --eye 0,0,4 --light -
 SCENE(mirrored_uv, "--size 96x96 --shadow off --eye 0,0,4 --light -1,1,1") {
     for (int i = 0; i < 4; i++) {
         const double x = i % 2 - .96, y = i / 2 - .96, u = i % 2, v = i / 2;
-        s.quad({x, y, 0}, {x + .92, y, 0}, {x + .92, y + .92, 0}, {x, y + .92, 0}, {u, v}, {1 - u, 1 - v});
+        s.quad("", {x, y, 0}, {x + .92, y, 0}, {x + .92, y + .92, 0}, {x, y + .92, 0}, {u, v}, {1 - u, 1 - v});
     }
     s.write("model_nm_tangent.tga", domes(1, 64));
     s.write("model_diffuse.tga", letter(rgb(150, 150, 190), rgb(200, 200, 190)));
@@ -436,104 +415,82 @@ SCENE(specular_exponents, "--size 144x108 --shadow off --no-fit --eye 0,0,4 --li
         const std::string name = std::to_string(exponents[i]);
         s.write(name + ".tga", checkers(1, 1, rgb(exponents[i], exponents[i], exponents[i])));
         s.materials += "newmtl e" + name + "\nKd .45 .35 .2\nmap_Ks " + name + ".tga\n";
-        s.use("e" + name);
-        s.sphere({(i % 3 - 1) * 1.15, i < 3 ? .62 : -.62, 0}, .53, 20);
+        s.sphere("e" + name, {(i % 3 - 1) * 1.15, i < 3 ? .62 : -.62, 0}, .53, 20);
     }
 }
 
 // A map of exponents that alternates between 0 and 60. There are squares where the light shines and its mirror image is
 // on the viewer's side; where it is not (0^0 is no highlight) there are none.
 SCENE(specular_dithered, "--size 96x96 --shadow off --eye 0,0,4 --light 1,.6,.1") {
-    s.use("red");
-    s.sphere({0, 0, 0}, 1, 24);
+    s.sphere("red", {0, 0, 0}, 1, 24);
     s.write("model_spec.tga", checkers(16, 4, rgb(0, 0, 0), rgb(60, 60, 60)));
 }
 
 // ---- shadows ----
 
 // No textures at all: geometry, light and shadow.
-SCENE(no_textures, "--size 128x128 --shadow-size 512 --eye 1,1.8,5 --light 1,1,.6") { add_yard(s); }
+PICTURE(no_textures, add_yard, "--size 128x128 --shadow-size 512 --eye 1,1.8,5 --light 1,1,.6")
 
 // The same without shadows.
-SCENE(shadow_off, "--size 128x128 --shadow off --eye 1,1.8,5 --light 1,1,.6") { add_yard(s); }
+PICTURE(shadow_off, add_yard, "--size 128x128 --shadow off --eye 1,1.8,5 --light 1,1,.6")
 
 // The lesson's test without a bias: what faces the light shadows itself. Its samples all lie to one side of what is
 // looked up there: where that side is nearer to the light a surface is dark as a whole, as the floor is.
-SCENE(bias_zero, "--size 128x128 --shadow-size 128 --bias 0 --eye 1,1.8,5 --light 1,1,.6") { add_yard(s); }
+PICTURE(bias_zero, add_yard, "--size 128x128 --shadow-size 128 --bias 0 --eye 1,1.8,5 --light 1,1,.6")
 
 // The same with a shadow buffer of few texels: shadows have teeth as large as they.
-SCENE(coarse_map, "--size 128x128 --shadow-size 24 --eye 1,1.8,5 --light 1,1,.6") { add_yard(s); }
+PICTURE(coarse_map, add_yard, "--size 128x128 --shadow-size 24 --eye 1,1.8,5 --light 1,1,.6")
 
 // The same without a shadow buffer: exact.
-SCENE(exact_shadow, "--size 128x128 --shadow exact --eye 1,1.8,5 --light 1,1,.6") { add_yard(s); }
+PICTURE(exact_shadow, add_yard, "--size 128x128 --shadow exact --eye 1,1.8,5 --light 1,1,.6")
 
 // Four fences, each twice as high as the one before it. Each throws a shadow twice as long as it is high ...
-static void add_fences(Scene& s) {
-    s.use("white");
-    s.quad({-1, 0, .8}, {1, 0, .8}, {1, 0, -.8}, {-1, 0, -.8});
+SCENE(fences, "--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0") {
+    s.quad("white", {-1, 0, .8}, {1, 0, .8}, {1, 0, -.8}, {-1, 0, -.8});
     constexpr double x[] = {-.85, -.55, -.1, .75}, height[] = {.015, .03, .06, .12};
-    s.use("green");
-    for (int i = 0; i < 4; i++) s.box({x[i], 0, -.7}, {x[i] + .015, height[i], .7});
+    for (int i = 0; i < 4; i++) s.box("green", {x[i], 0, -.7}, {x[i] + .015, height[i], .7});
 }
-SCENE(fences, "--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0") { add_fences(s); }
 
 // ... but with the lesson's constant as the bias the lowest one does not, and the others not at their foot.
-SCENE(fences_lesson_bias, "--size 480x320 --shadow-size 1024 --bias 43.34 --eye -.3,1.6,1.6 --light 2,1,0") {
-    add_fences(s);
-}
+PICTURE(fences_lesson_bias, fences, "--size 480x320 --shadow-size 1024 --bias 43.34 --eye -.3,1.6,1.6 --light 2,1,0")
 
 // The light is right above, in the direction of up: the shadow of a table is under it.
 SCENE(light_along_up, "--size 128x128 --shadow-size 512 --eye .6,1.5,4 --light 0,1,0") {
-    s.use("grey");
-    s.quad({-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
-    s.use("blue");
-    s.box({-.6, .1, -.3}, {.6, .2, .5});
-    s.box({-.6, -.6, .4}, {-.5, .1, .5});
-    s.box({.5, -.6, .4}, {.6, .1, .5});
+    s.quad("grey", {-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
+    s.box("blue", {-.6, .1, -.3}, {.6, .2, .5});
+    s.box("blue", {-.6, -.6, .4}, {-.5, .1, .5});
+    s.box("blue", {.5, -.6, .4}, {.6, .1, .5});
 }
 
 // Two models, light from the right and behind: the red one's tower shadows the blue floor, the blue one's board both.
-static void add_two_models(Scene& s) {
-    s.use("red");
-    s.quad({0, -.7, .9}, {1, -.7, .9}, {1, -.7, -.9}, {0, -.7, -.9});
-    s.box({.2, -.7, .25}, {.45, .2, .5});
+SCENE(two_models, "--size 128x128 --shadow-size 512 --eye .5,3,4 --light .7,1,-.3") {
+    s.quad("red", {0, -.7, .9}, {1, -.7, .9}, {1, -.7, -.9}, {0, -.7, -.9});
+    s.box("red", {.2, -.7, .25}, {.45, .2, .5});
     s.next_model();
-    s.use("blue");
-    s.quad({-1, -.7, .9}, {0, -.7, .9}, {0, -.7, -.9}, {-1, -.7, -.9});
-    s.box({-.2, -.7, -.75}, {-.1, .1, -.65});
-    s.box({-.3, .1, -.85}, {.9, .18, -.55});
+    s.quad("blue", {-1, -.7, .9}, {0, -.7, .9}, {0, -.7, -.9}, {-1, -.7, -.9});
+    s.box("blue", {-.2, -.7, -.75}, {-.1, .1, -.65});
+    s.box("blue", {-.3, .1, -.85}, {.9, .18, -.55});
 }
-SCENE(two_models, "--size 128x128 --shadow-size 512 --eye .5,3,4 --light .7,1,-.3") { add_two_models(s); }
 
 // What the light sees of them: near is white.
-SCENE(two_models_depth, "--size 16x16 --shadow-size 128 --eye .5,3,4 --light .7,1,-.3", "depth.tga") {
-    add_two_models(s);
-}
+PICTURE(two_models_depth, two_models, "--size 16x16 --shadow-size 128 --eye .5,3,4 --light .7,1,-.3", "depth.tga")
 
 // A floor far larger than the cube [-1,1]^3, and a row of posts on it: all of them throw shadows ...
-static void add_posts(Scene& s) {
-    s.use("white");
-    s.quad({-4, -.5, 1.2}, {4, -.5, 1.2}, {4, -.5, -1.2}, {-4, -.5, -1.2});
-    s.use("violet");
-    for (int i = -3; i <= 3; i++) s.box({i - .1, -.5, -.1}, {i + .1, .4, .1});
-}
 SCENE(large_floor, "--size 192x64 --shadow-size 512 --no-fit --eye 0,7,10 --light .5,1,.8") {
-    add_posts(s);
+    s.quad("white", {-4, -.5, 1.2}, {4, -.5, 1.2}, {4, -.5, -1.2}, {-4, -.5, -1.2});
+    for (int i = -3; i <= 3; i++) s.box("violet", {i - .1, -.5, -.1}, {i + .1, .4, .1});
 }
 
 // ... but the lesson's light sees only the middle of the floor. What it does not see is lit.
-SCENE(outside_of_the_map, "--size 192x64 --shadow-size 512 --bias 43.34 --no-fit --eye 0,7,10 --light .5,1,.8") {
-    add_posts(s);
-}
+PICTURE(outside_of_the_map, large_floor,
+        "--size 192x64 --shadow-size 512 --bias 43.34 --no-fit --eye 0,7,10 --light .5,1,.8")
 
 // A wall shadows the right half of the floor's letter, which glows all the same.
 SCENE(glow_in_shadow, "--size 128x128 --shadow-size 512 --eye .3,3,3 --light 1,1,0") {
-    s.use("grey");
-    s.quad({-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
+    s.quad("grey", {-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
     s.write("model_glow.tga", letter(rgb(130, 70, 0), rgb(0, 0, 0)));
     s.next_model();
-    s.use("blue");
-    s.box({.9, -.6, -.9}, {1, .3, .9});
+    s.box("blue", {.9, -.6, -.9}, {1, .3, .9});
 }
 
 // ---- the default render, and that wrong pictures are noticed ----
@@ -546,7 +503,7 @@ TEST("default render") {
 }
 
 TEST("a wrong bias or camera is another picture") {
-    const Scene yard(no_textures);
+    const Scene yard(add_yard);
     const TGAImage reference = TGAImage::read_tga_file(fs::path(UMBRA_REFERENCE_DIR) / "no_textures.tga");
     const auto same = [&](const std::string& arguments) {
         return compare(yard.draw("--size 128x128 --shadow-size 512 --light 1,1,.6 " + arguments), reference).same();
