@@ -5,13 +5,9 @@
 #include "run.h"
 #include "scenes.h"
 
-#ifdef UMBRA_REPORT
-static const std::string reporter = "\"" UMBRA_REPORT "\"";
-#else
-static const std::string reporter = umbra_command + " --report";
-#endif
-
 namespace {
+
+const std::string reporter = "\"" UMBRA_REPORT "\"";
 
 struct Figures {  // what the ray caster says of a picture, in pixels
     double coverage, facing, falsely_dark, falsely_lit;
@@ -105,89 +101,75 @@ void check_no_acne(const std::string& options, double s = 1) {
     Scene(floors.text()).check_lit(options, 100);
 }
 
-// The pipeline itself, for what only clip space can say: three corners a face.
-struct Seen {
-    std::vector<int> faces;  // the nearest at each pixel, -1 where there is none; rows from the bottom up
-    std::vector<double> z;   // its depth on the screen
-    long drawn() const { return std::count_if(faces.begin(), faces.end(), [](int face) { return face >= 0; }); }
-};
-
-Seen seen(const std::vector<vec4>& clip, int width, int height) {
-    const Drawing d = drawing(clip, width, height);
-    Seen s;
-    for (int i = 0; i < width * height; i++) {
-        s.faces.push_back(d.face(i % width, i / width));
-        s.z.push_back(d.z.row(i / width)[i % width]);
-    }
-    return s;
+// The pipeline itself, for what only clip space can say: three corners a face. The nearest face at each pixel, -1 where
+// there is none, rows from the bottom up.
+std::vector<int> faces(const std::vector<vec4>& clip, int size) {
+    const Drawing d = drawing(clip, size, size);
+    std::vector<int> all;
+    for (int i = 0; i < size * size; i++) all.push_back(d.face(i % size, i / size));
+    return all;
 }
+
+const Scene the_yard(yard());  // what most tests draw
 
 }  // namespace
 
 // Exactly parallel, the picture is that of an `up` of zero: the axis least parallel to the view takes its place.
 TEST("cameras: the view along up, both ways, exactly and nearly") {
-    const Scene f(yard());
     for (const std::string& options : each("--up %", {"1,1,4", "-1,-1,-4", "2e-300,2e-300,8e-300"}))
-        CHECK(f.good(options).frame == f.good("--up 0,0,0").frame);
-    f.check_exact(each("--up %,1,4", {"1.0001", "1.0000001", "1.000000000001"}), 500);
-    f.check_exact(each("--up -%,-1,-4", {"1.0001", "1.0000001", "1.000000000001"}), 500);
+        CHECK(the_yard.good(options).frame == the_yard.good("--up 0,0,0").frame);
+    the_yard.check_exact(each("--up %,1,4", {"1.0001", "1.0000001", "1.000000000001"}), 500);
+    the_yard.check_exact(each("--up -%,-1,-4", {"1.0001", "1.0000001", "1.000000000001"}), 500);
 }
 
 TEST("cameras: the light along up, both ways, exactly and nearly") {
-    const Scene f(yard());
     const Strings x{"0", "1e-4", "-1e-4", "1e-7", "1e-12"};
-    f.check_exact(each("--light %,1,0", x), 500);
-    f.check_exact(each("--eye 1,-2,4 --light %,-1,0", x), 500);
+    the_yard.check_exact(each("--light %,1,0", x), 500);
+    the_yard.check_exact(each("--eye 1,-2,4 --light %,-1,0", x), 500);
     for (const std::string& options : each("--light %,1,0", x)) check_no_acne(options);
 }
 
 // Only the direction counts: the same bytes at any length that a double has, denormal ones too.
 TEST("cameras: tiny and huge up and light") {
-    const Scene f(yard());
-    f.check_same(each("--up 0,%,0", {"1", "1e-300", "4.9406564584124654e-324", "1e300", "1e307"}));
-    f.check_same(each("--light %,%,0", {"1", "1e-300", "4.9406564584124654e-324", "1e300", "7e306"}));
+    the_yard.check_same(each("--up 0,%,0", {"1", "1e-300", "4.9406564584124654e-324", "1e300", "1e307"}));
+    the_yard.check_same(each("--light %,%,0", {"1", "1e-300", "4.9406564584124654e-324", "1e300", "7e306"}));
 }
 
 TEST("cameras: no direction, no number, or beyond the range of a double is a wrong command line") {
-    const Scene f(yard());
     for (const std::string wrong : {"--light 0,0,0", "--light nan,0,0", "--light inf,1,0", "--eye nan,0,0",
                                     "--up 0,inf,0", "--center 1e999,0,0", "--eye 1,2,3 --center 1,2,3",
                                     "--up 1.7e308,1.7e308,-1.7e308", "--eye 1.7e308,0,0 --center -1.7e308,0,0"})
-        check_refused(f, wrong + " m.obj", 2, wrong.substr(0, wrong.find(' ')));
+        check_refused(the_yard, wrong + " m.obj", 2, wrong.substr(0, wrong.find(' ')));
 }
 
 TEST("cameras: center off the origin") {
-    const Scene f(yard());
-    f.check_exact({"--center .5,.5,.5"}, 100);
-    for (const std::string x : {"1e2", "1e6", "1e18", "1e300"}) f.check_drawn("--center " + x + ",0,0", 0, 0);
+    the_yard.check_exact({"--center .5,.5,.5"}, 100);
+    for (const std::string x : {"1e2", "1e6", "1e18", "1e300"}) the_yard.check_drawn("--center " + x + ",0,0", 0, 0);
     // Far off and turned: normals are not moved by a translation, however large.
-    f.check_drawn("--center 8e16,0,-6e16 --eye 80000003e9,0,-59999996e9", 0, 0);
+    the_yard.check_drawn("--center 8e16,0,-6e16 --eye 80000003e9,0,-59999996e9", 0, 0);
 }
 
 // From 1e10 on the perspective moves no corner by 2e-8 pixel, a thousandth of a sub-pixel: the picture stays as it is.
 TEST("cameras: the eye at 1e4, 1e8 and farther") {
-    const Scene f(yard());
-    f.check_exact(each("--eye 1%,1%,4%", {"e4", "e8"}), 300);
-    f.check_same(each("--eye 1%,1%,4%", {"e10", "e16", "e100", "e300"}));
+    the_yard.check_exact(each("--eye 1%,1%,4%", {"e4", "e8"}), 300);
+    the_yard.check_same(each("--eye 1%,1%,4%", {"e10", "e16", "e100", "e300"}));
 }
 
 TEST("cameras: the eye inside the model and on a surface") {
-    const Scene f(yard());
-    f.check_exact({"--eye .01,.125,.02",                                      // between wall and block
-                   "--eye .375,-.5,.25 --center -.25,-.25,0",                 // on the floor
-                   "--eye 0,-.49999,0 --center -.5,-.375,-.25"}, 1);          // a hair above it
+    the_yard.check_exact({"--eye .01,.125,.02",                                // between wall and block
+                          "--eye .375,-.5,.25 --center -.25,-.25,0",           // on the floor
+                          "--eye 0,-.49999,0 --center -.5,-.375,-.25"}, 1);    // a hair above it
     const std::string in_the_block = "--eye .3125,.125,.25 --center .25,.125,.125";
-    CHECK_EQ(f.report("--shadow exact " + in_the_block).coverage, 0);
-    f.check_drawn(in_the_block, 3600, 3600);
+    CHECK_EQ(the_yard.report("--shadow exact " + in_the_block).coverage, 0);
+    the_yard.check_drawn(in_the_block, 3600, 3600);
 }
 
 // The eye's distance from center is the field of view: the window at center is 8/3 wide.
 TEST("cameras: near distances and fields of view") {
-    const Scene f(yard());
     for (const double d : {1e-1, 1e-3, 1e-5, 1e-6})  // up to 179.9999 degrees
-        f.check_exact({"--center 0,-.25,0 --eye " + triple({.25 * d, -.25 - .125 * d, d})}, 300);
+        the_yard.check_exact({"--center 0,-.25,0 --eye " + triple({.25 * d, -.25 - .125 * d, d})}, 300);
     for (const double d : {8., 1e2, 1e4, 1.5e4})  // down to .01 degrees
-        f.check_exact({"--eye " + triple(vec3{.25, .125, 1} * d)}, 300);
+        the_yard.check_exact({"--eye " + triple(vec3{.25, .125, 1} * d)}, 300);
 }
 
 TEST("coordinates: a fitted model scaled by 1e6 to 1e300 and 1e-6 to 1e-300; by a power of two not one byte changes") {
@@ -239,7 +221,7 @@ TEST("coordinates: model and camera moved together by 1e2 to 5e14") {
         };
         for (const double d : {1e2, 1e4, 1e6, 1e9, 1e12, 5e14}) CHECK(draw({d, d / 2, -d}).same_pictures(draw({})));
     }
-    Scene(yard()).check_drawn("--light 1,1,.5 --eye 1.125,1.25,4", 501, 3600);
+    the_yard.check_drawn("--light 1,1,.5 --eye 1.125,1.25,4", 501, 3600);
 }
 
 TEST("coordinates: vertices that are no numbers, or beyond the range of a double") {
@@ -299,8 +281,8 @@ TEST("coordinates: a tangent-space normal map on a face of 1e308") {
 
 TEST("triangles: a repeated index and collinear corners draw nothing and change nothing") {
     const std::string line = "v -1 -.5 0\nv 0 0 0\nv 1 .5 0\n";
-    const Scene plain(yard()), more(yard() + line + "f -3 -2 -1\nf -1 -1 -2\nf -2 -2 -2\nf -3 -1 -3\n");
-    for (const std::string& method : methods) CHECK(more.good(method).same_pictures(plain.good(method)));
+    const Scene more(yard() + line + "f -3 -2 -1\nf -1 -1 -2\nf -2 -2 -2\nf -3 -1 -3\n");
+    for (const std::string& method : methods) CHECK(more.good(method).same_pictures(the_yard.good(method)));
     more.check_exact({""}, 500);
 }
 
@@ -368,15 +350,15 @@ TEST("triangles: w at most zero at one, two and three corners") {
             clip.push_back({r.in(-2, 2), r.in(-2, 2), r.in(-1, 1) * w, w});
             for (int row = 0; row < 3; row++) corners[row][i] = clip[i][row < 2 ? row : 3];
         }
-        const Seen d = seen(clip, 16, 16);
-        drawn_by[behind] += d.drawn();
+        const std::vector<int> drawn = faces(clip, 16);
+        drawn_by[behind] += std::count(drawn.begin(), drawn.end(), 0);
         const Wide area = std::fabs(dot(corners[0], cross(corners[1], corners[2])));
         const auto inverse = invert(corners);
         for (int pixel = 0; pixel < 256 && inverse; pixel++) {
             const auto e = *inverse * vec<3, Wide>{(pixel % 16 + Wide(.5)) / 8 - 1, (pixel / 16 + Wide(.5)) / 8 - 1, 1};
             if (std::min({std::fabs(e.x), std::fabs(e.y), std::fabs(e.z), Wide(1)}) * area < 1e-3L) continue;
             samples++;
-            CHECK_EQ(d.faces[pixel] >= 0, e.x > 0 && e.y > 0 && e.z > 0);
+            CHECK_EQ(drawn[pixel] >= 0, e.x > 0 && e.y > 0 && e.z > 0);
         }
     }
     CHECK(drawn_by[0] > 1000 && drawn_by[1] > 1000 && drawn_by[2] > 1000 && drawn_by[3] == 0);
@@ -386,13 +368,12 @@ TEST("triangles: w at most zero at one, two and three corners") {
 TEST("triangles: corners exactly on the near plane") {
     constexpr double near = 1. / (1 << 22);
     for (const double z : {-near, 0., near})
-        for (const double w : {near, std::nextafter(near, 0), std::nextafter(near, 1)}) {
-            const Seen d = seen({{-w, -w, z, w}, {3 * w, -w, z, w}, {-w, 3 * w, z, w}}, 32, 32);
-            CHECK_EQ(d.drawn(), w < near ? 0 : 1024);
-        }
+        for (const double w : {near, std::nextafter(near, 0), std::nextafter(near, 1)})
+            CHECK(faces({{-w, -w, z, w}, {3 * w, -w, z, w}, {-w, 3 * w, z, w}}, 32) ==
+                  std::vector<int>(1024, w < near ? -1 : 0));
     // One corner on it, straight above the picture: the same pixels as from a corner that is there with w = 1.
-    const Seen on = seen({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3 * near, 0, near}}, 32, 32);
-    CHECK(on.faces == seen({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3, 0, 1}}, 32, 32).faces);
+    CHECK(faces({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3 * near, 0, near}}, 32) ==
+          faces({{-1, -1, 0, 1}, {1, -1, 0, 1}, {0, 3, 0, 1}}, 32));
 }
 
 // A square between pixels' centres: those on its left and top edges are its own, those on the others are not.
@@ -407,15 +388,19 @@ TEST("triangles: corners exactly on pixels' centres") {
 // 4096 pixels around the picture are the guard band; with 64 pixels they are at -129 and 129.
 TEST("triangles: corners exactly on the guard band, a hair and far beyond it") {
     const auto around = [](double far) {
-        return seen({{-far, -far, far / 258, 1}, {far, -far, -far / 258, 1}, {0, far, 0, 1}}, 64, 64);
+        return drawing({{-far, -far, far / 258, 1}, {far, -far, -far / 258, 1}, {0, far, 0, 1}}, 64, 64);
     };
+    const Drawing on = around(129);
     for (const double far : {129., std::nextafter(129., 200.), 130., 1e4, 1e8}) {
-        const Seen on = around(129), beyond = around(far);
-        CHECK_EQ(beyond.drawn(), 4096);
-        for (int i = 0; i < 4096; i++) CHECK_NEAR(beyond.z[i], on.z[i], 0x1p-13);  // one step of a float
+        const Drawing beyond = around(far);
+        for (int x = 0; x < 64; x++)
+            for (int y = 0; y < 64; y++) {
+                CHECK_EQ(beyond.face(x, y), 0);
+                CHECK_NEAR(beyond.z.row(y)[x], on.z.row(y)[x], 0x1p-13);  // one step of a float
+            }
     }
     // An edge of the triangle on the band's very border: nothing of the picture.
-    CHECK_EQ(seen({{-129, -129, 0, 1}, {-129, 129, 0, 1}, {-130, 0, 0, 1}}, 64, 64).drawn(), 0);
+    CHECK(faces({{-129, -129, 0, 1}, {-129, 129, 0, 1}, {-130, 0, 0, 1}}, 64) == std::vector<int>(4096, -1));
 }
 
 // A float in [1024,2048] has steps of 2^-13, which is 1.22e-7 of z: layers farther apart are told apart. Nearer ones
@@ -429,21 +414,20 @@ TEST("depth: two layers 1e-2 to 1e-9 apart, in either order") {
                     for (const int face : {0, 1})
                         for (const vec2& p : {vec2{-1, -1}, vec2{3, -1}, vec2{-1, 3}})
                             clip.push_back({p.x, p.y, z + (face == nearer ? gap : 0) + slope * .1 * (p.x + p.y), 1});
-                    const Seen d = seen(clip, 16, 16);
-                    if (gap >= 1.3e-7 || nearer == 0) CHECK(d.faces == std::vector<int>(256, nearer));
+                    if (gap >= 1.3e-7 || nearer == 0) CHECK(faces(clip, 16) == std::vector<int>(256, nearer));
                 }
 }
 
 // Many black triangles across each other; then all of them twice more, in white.
 TEST("depth: of coplanar duplicates the first drawn wins, always") {
     Random r(3);
-    std::string faces;
+    std::vector<std::vector<vec3>> triangles;
     for (int k = 0; k < 1000; k++) {
         const vec3 a = r.point(.9), b = a + r.point(.3), c = a + r.point(.3);
-        for (const vec3& v : {a, b, c}) faces += "v " + number(v.x) + ' ' + number(v.y) + ' ' + number(v.z) + '\n';
-        faces += "f -3 -2 -1\n";
+        triangles.push_back({a, b, c});
     }
-    const Scene f("mtllib m.mtl\nusemtl black\n" + faces + "usemtl white\n" + faces + faces);
+    const std::string text = polygons(triangles);  // a copy of it has the first one's corners
+    const Scene f("mtllib m.mtl\nusemtl black\n" + text + "usemtl white\n" + text + text);
     f.write("m.mtl", "newmtl black\nKd 0 0 0\nnewmtl white\nKd 1 1 1\n");
     long black = 0;
     f.each_pixel("--size 400x400 --shadow off --no-fit --eye 0,0,1.3 --light 0,0,1", [&](int, int, int blue) {
@@ -479,9 +463,8 @@ TEST("shadow: light edge-on and from behind leaves a single-sided floor at the a
 
 // A light is a direction: where on its ray one takes it to be, even within a wall, is the same.
 TEST("shadow: the light inside the model") {
-    const Scene f(yard());
-    f.check_same(each("--light %", {"1.5,.5,1", ".375,.125,.25", ".1875,.0625,.125"}));
-    CHECK(f.good("--light 1.5,.5,1").frame != f.good("--light -0.0000015,-0.0000005,-0.000001").frame);
+    the_yard.check_same(each("--light %", {"1.5,.5,1", ".375,.125,.25", ".1875,.0625,.125"}));
+    CHECK(the_yard.good("--light 1.5,.5,1").frame != the_yard.good("--light -0.0000015,-0.0000005,-0.000001").frame);
 }
 
 TEST("shadow: casters outside of the camera's view") {
@@ -500,16 +483,15 @@ TEST("shadow: receivers outside of the light's view are lit") {
 
 // A buffer of one texel knows one depth: it shadows nothing that it should not. One of 16384 x 16384 takes 1 GiB.
 TEST("shadow: a buffer of 1x1, 2x2, 3x3 and 16384x16384") {
-    const Scene f(yard());
     for (const int size : {1, 2, 3}) {
         const std::string option = "--shadow-size " + std::to_string(size);
-        const std::string depth = f.good(option).depth;
+        const std::string depth = the_yard.good(option).depth;
         CHECK(depth.at(12) == size && depth.at(14) == size);  // a TGA's width and height
         check_no_acne(option);
     }
-    f.check_lit("--shadow-size 1", 500);
+    the_yard.check_lit("--shadow-size 1", 500);
 #ifndef UMBRA_SANITIZED
-    CHECK(f.good("--shadow-size 16384").frame == f.good("--shadow exact").frame);
+    CHECK(the_yard.good("--shadow-size 16384").frame == the_yard.good("--shadow exact").frame);
 #endif
 }
 
@@ -517,15 +499,15 @@ TEST("shadow: a buffer of 1x1, 2x2, 3x3 and 16384x16384") {
 #if !defined(UMBRA_SANITIZED) && defined(__linux__)
 TEST("pictures: 16384x16384 within its memory") {
     const std::string limit = "ulimit -v " + std::to_string((1548 + 128) * 1024);  // KiB; 128 MiB for all else
-    CHECK(Scene(yard()).good("--threads 2 --size 16384x16384", limit + " && " + umbra_command).frame.size() > 1000000);
+    CHECK(the_yard.good("--threads 2 --size 16384x16384", limit + " && " + umbra_command).frame.size() > 1000000);
 }
 #endif
 
 // [-1,1]^2 is the middle three quarters of the shorter side, so a square stays a square.
 TEST("pictures: from 1x1 to long ones, not stretched") {
     const Scene f(polygons({{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}}));
-    for (const auto& [width, height] : {std::pair(1, 1), std::pair(2, 2), std::pair(7, 5), std::pair(1600, 200),
-                                        std::pair(200, 1600), std::pair(16383, 1), std::pair(1, 16383)}) {
+    for (const auto& [width, height] :
+         {std::pair(1, 1), {2, 2}, {7, 5}, {1600, 200}, {200, 1600}, {16383, 1}, {1, 16383}}) {
         const double w = width, h = height, half = .375 * std::min(w, h);
         const auto check = [&](int x, int y, int blue) {
             CHECK_EQ(blue > 0, std::fabs(x + .5 - w / 2) < half && std::fabs(y + .5 - h / 2) < half);
@@ -536,9 +518,8 @@ TEST("pictures: from 1x1 to long ones, not stretched") {
 }
 
 TEST("pictures: no size, a negative one and one beyond 16384 are errors") {
-    const Scene f(yard());
     for (const std::string size : {"0x0", "0x5", "5x0", "-1x5", "5x-1", "16385x1", "1x16385"})
-        check_refused(f, "--size " + size + " m.obj", 2, "--size");
+        check_refused(the_yard, "--size " + size + " m.obj", 2, "--size");
 }
 
 // Relative to center a scene that was moved is the one that was not: the light's camera is the same, bit for bit.
@@ -563,8 +544,7 @@ TEST("matrices: the viewer's camera from c = 1/1.2 to 1e-8 against long double")
             const vec<3, Wide> q{p.x, p.y, p.z};
             const Wide w = 1 - dot(q, z) / Wide(norm(eye));
             // Some twenty roundings of numbers up to 800: 20 * 800 * 2^-53 = 2e-12.
-            CHECK_NEAR(s.x, static_cast<double>(400 + 300 * dot(q, x) / w), 1e-11);
-            CHECK_NEAR(s.y, static_cast<double>(400 + 300 * dot(q, y) / w), 1e-11);
+            for (const int i : {0, 1}) CHECK_NEAR(s[i], static_cast<double>(400 + 300 * dot(q, i ? y : x) / w), 1e-11);
         }
     }
 }
