@@ -2,6 +2,7 @@
 #pragma once
 #include "geometry.h"
 
+#include <array>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -33,21 +34,24 @@ private:
     int n_ = 0;
 };
 
+// The six sides of a box, seen from outside, or from inside where LOW and HIGH are exchanged.
+inline std::vector<std::array<vec3, 4>> box_sides(const vec3& low, const vec3& high) {
+    const auto at = [&](int x, int y, int z) {
+        return vec3{x ? high.x : low.x, y ? high.y : low.y, z ? high.z : low.z};
+    };
+    return {{at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)}, {at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)},
+            {at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)}, {at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0)},
+            {at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0)}, {at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)}};
+}
+
 // A floor, a wall and a floating block. All coordinates are multiples of 1/8, so that moving them by a whole number or
 // multiplying them by a power of two is exact.
 inline std::string yard(const vec3& scale = {1, 1, 1}, const vec3& by = {}) {
     Obj obj;
-    const auto box = [&](const vec3& a, const vec3& b) {
-        const auto at = [&](int x, int y, int z) {
-            const vec3 v{x ? b.x : a.x, y ? b.y : a.y, z ? b.z : a.z};
-            return vec3{v.x * scale.x, v.y * scale.y, v.z * scale.z} + by;
-        };
-        obj.polygon({at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)});
-        obj.polygon({at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)});
-        obj.polygon({at(1, 0, 1), at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)});
-        obj.polygon({at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0)});
-        obj.polygon({at(0, 1, 1), at(1, 1, 1), at(1, 1, 0), at(0, 1, 0)});
-        obj.polygon({at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1)});
+    const auto placed = [&](const vec3& v) { return vec3{v.x * scale.x, v.y * scale.y, v.z * scale.z} + by; };
+    const auto box = [&](const vec3& low, const vec3& high) {
+        for (const auto& [a, b, c, d] : box_sides(low, high))
+            obj.polygon({placed(a), placed(b), placed(c), placed(d)});
     };
     box({-1, -.625, -1}, {1, -.5, 1});
     box({-.5, -.5, -.5}, {-.25, .5, .5});
