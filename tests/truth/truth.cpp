@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <system_error>
 #include <thread>
+#include <tuple>
 
 namespace {
 
@@ -24,27 +25,21 @@ public:
     Exact(double value = 0) { add(value); }
     int sign() const { return parts_.empty() ? 0 : parts_.back() > 0 ? 1 : -1; }
     double rounded() const { return std::accumulate(parts_.begin(), parts_.end(), 0.); }
-    Exact& operator+=(const Exact& b) {
-        for (const double part : b.parts_) add(part);
-        return *this;
+    friend Exact operator+(Exact a, const Exact& b) {
+        for (const double part : b.parts_) a.add(part);
+        return a;
     }
-    Exact& operator-=(const Exact& b) {
-        for (const double part : b.parts_) add(-part);
-        return *this;
-    }
-    Exact& operator*=(const Exact& b) {
+    friend Exact operator-(const Exact& a, const Exact& b) { return a + b * -1; }
+    friend Exact operator*(const Exact& a, const Exact& b) {
         Exact product;
-        for (const double x : parts_)
+        for (const double x : a.parts_)
             for (const double y : b.parts_) {
                 const double p = x * y;
                 product.add(std::fma(x, y, -p));  // what p lost
                 product.add(p);
             }
-        return *this = product;
+        return product;
     }
-    friend Exact operator+(Exact a, const Exact& b) { return a += b; }
-    friend Exact operator-(Exact a, const Exact& b) { return a -= b; }
-    friend Exact operator*(Exact a, const Exact& b) { return a *= b; }
 
 private:
     void add(double b) {  // Shewchuk's Grow-Expansion, zeros left out
@@ -176,26 +171,25 @@ struct RayCaster::ExactTriangle {
 
 // Where the line of a ray meets a triangle, if it does.
 struct RayCaster::Meeting {
-    bool meets = false;
-    bool in_front = false;    // t > 0
+    bool in_front = false;    // it meets the triangle, at t > 0
     bool front_seen = false;  // by an eye that looks along the ray
     double t = 0, t_error = 0;
     vec3 weight;  // none negative; their sum is not 1
 
     Meeting(const Ray& ray, const Triangle& triangle) {
-        double x[3], y[3], z[3], size = 0, depth = 0;
+        vec3 x, y, z;
+        double size = 0;
         for (int i = 0; i < 3; i++) {
             const vec3 moved = (triangle[i] - ray.start[0]) - ray.offset;
             z[i] = moved[ray.kz];
             x[i] = moved[ray.kx] - ray.shear_x * z[i];
             y[i] = moved[ray.ky] - ray.shear_y * z[i];
             size = std::max(size, std::fabs(x[i]) + std::fabs(y[i]));
-            depth = std::max(depth, std::fabs(z[i]));
         }
         // Twice the areas that (0,0) spans with the sides, with signs. The two products of one come to size^2 at most,
         // their factors are off by ray.error: together 2 error size + 2 error^2 + 2u size^2; and size <= 4m makes the
         // last of these less than error size / 4.
-        vec3 area{x[1] * y[2] - y[1] * x[2], x[2] * y[0] - y[2] * x[0], x[0] * y[1] - y[0] * x[1]};
+        vec3 area = cross(x, y);
         const double area_error = 3 * ray.error * (size + ray.error);
         const double lowest = std::min({area.x, area.y, area.z}), highest = std::max({area.x, area.y, area.z});
         if (lowest < -area_error && highest > area_error) return;
@@ -206,15 +200,14 @@ struct RayCaster::Meeting {
             const bool left = area.x > 0 || area.y > 0 || area.z > 0, right = area.x < 0 || area.y < 0 || area.z < 0;
             if (left == right) return;  // outside; or all are 0: the triangle is seen edge-on or has no area
         }
-        meets = true;
         const double sum = area.x + area.y + area.z;
         weight = area * sign(sum);
         front_seen = sum * ray.per_z < 0;
 
         // t = volume / (sum * direction). Depths are off by less than ray.error and not beyond m, so the volume's own
         // rounding, at most 4u |sum| m, is well within the second error below.
-        double volume = area.x * z[0] + area.y * z[1] + area.z * z[2];
-        const double volume_error = 3 * area_error * (depth + ray.error) + 2 * std::fabs(sum) * ray.error;
+        double volume = dot(area, z);
+        const double volume_error = 3 * area_error * (largest(z) + ray.error) + 2 * std::fabs(sum) * ray.error;
         if (std::fabs(volume) <= volume_error) {
             const ExactTriangle e(ray, triangle);
             volume = e.volume().rounded() / (e.sum * e.sum * e.sum);
@@ -316,14 +309,11 @@ std::optional<Hit> RayCaster::first_hit(const vec3& origin, const vec3& directio
     int nearest = -1;
     traverse(ray, [&](int number) {
         const Meeting meeting(ray, triangles_[number]);
-        if (meeting.meets && meeting.in_front) {
+        if (meeting.in_front) {
             bool nearer = !best || meeting.t < best->t;
-            if (best && std::fabs(meeting.t - best->t) <= meeting.t_error + best->t_error) {  // too close to call
-                const int order = Meeting::exact_order(ray, triangles_[number], triangles_[nearest]);
-                nearer = order != 0                               ? order < 0
-                         : meeting.front_seen != best->front_seen ? meeting.front_seen
-                                                                  : number < nearest;
-            }
+            if (best && std::fabs(meeting.t - best->t) <= meeting.t_error + best->t_error)  // too close to call
+                nearer = std::tuple(Meeting::exact_order(ray, triangles_[number], triangles_[nearest]),
+                                    !meeting.front_seen, number) < std::tuple(0, !best->front_seen, nearest);
             if (nearer) best = meeting, nearest = number;
         }
         return best ? best->t + best->t_error : infinity;
@@ -340,7 +330,7 @@ bool RayCaster::blocked(const Ray& ray, int own, double beyond) const {
     traverse(ray, [&](int number) {
         if (number != own) {
             const Meeting meeting(ray, triangles_[number]);
-            found = meeting.meets && meeting.in_front && meeting.t > beyond;
+            found = meeting.in_front && meeting.t > beyond;
         }
         return found ? -1 : infinity;
     });

@@ -21,14 +21,13 @@ TEST("lookat takes center to the origin and eye to the +z axis") {
 }
 
 TEST("lookat is defined where up is of no use") {
-    for (const vec3& eye : {vec3{0, 1, 0}, vec3{0, -1, 0}, vec3{1, 0, 0}, vec3{0, 0, -1}, vec3{1, 1, 1}}) {
+    for (const vec3& eye : {vec3{0, 1, 0}, vec3{0, -1, 0}, vec3{1, 0, 0}, vec3{0, 0, -1}, vec3{1, 1, 1}})
         for (const vec3& up : {eye, -eye, eye * 1e-300, vec3{}}) {
             const mat4 m = lookat(eye, {}, up);
             CHECK_NEAR(norm(cross(m[0].xyz(), m[1].xyz()) - m[2].xyz()), 0, 1e-14);
             CHECK_NEAR(norm(m[0].xyz()), 1, 1e-14);
             CHECK_NEAR((m * point(eye)).z, norm(eye), 1e-14);
         }
-    }
     CHECK(lookat({1, 2, 3}, {1, 2, 3}, {0, 1, 0}) == translation({-1, -2, -3}));
 }
 
@@ -39,14 +38,11 @@ TEST("the projection divides by 1 - z/d") {
 
 TEST("the viewport's corners") {
     Random r(2);
-    for (int k = 0; k < 1000; k++) {
+    for (int k = 0; k < 8000; k++) {
         const double x = r.in(-100, 100), y = r.in(-100, 100), w = r.in(1, 1000), h = r.in(1, 1000);
-        const mat4 m = viewport(x, y, w, h);
-        for (int corner = 0; corner < 8; corner++) {
-            const int i = corner & 1, j = corner >> 1 & 1, l = corner >> 2;
-            const vec3 p = (m * point(vec3{i * 2. - 1, j * 2. - 1, l * 2. - 1})).xyz();
-            CHECK_NEAR(norm(p - vec3{x + i * w, y + j * h, l * screen_depth}), 0, 1e-12);
-        }
+        const int i = k & 1, j = k >> 1 & 1, l = k >> 2 & 1;
+        const vec4 p = viewport(x, y, w, h) * point(vec3{i * 2. - 1, j * 2. - 1, l * 2. - 1});
+        CHECK_NEAR(norm(p.xyz() - vec3{x + i * w, y + j * h, l * screen_depth}), 0, 1e-12);
     }
 }
 
@@ -67,20 +63,18 @@ TEST("Mshadow there and back") {
 TEST("every visible pixel is shaded once, hidden faces not at all") {
     Random r(7);
     std::vector<vec4> clip;
-    for (int k = 0; k < 300; k++)
-        for (int i = 0; i < 3; i++) clip.push_back(point(r.point(1)));
+    for (int corner = 0; corner < 900; corner++) clip.push_back(point(r.point(1)));
     for (const vec3& v : {vec3{-3, -3, -.9}, vec3{3, -3, -.9}, vec3{0, 5, -.9}})  // behind all
         clip.push_back(point(v));
+    static std::vector<std::atomic<int>> calls(301);
     struct Counting final : ClipShader {
-        std::vector<std::atomic<int>>& calls;
-        Counting(const std::vector<vec4>& c, std::vector<std::atomic<int>>& n) : ClipShader(c), calls(n) {}
+        using ClipShader::ClipShader;
         Color fragment(const Fragment& f) const override {
             calls[f.face]++;
             return ClipShader::fragment(f);
         }
     };
-    std::vector<std::atomic<int>> calls(301);
-    const Drawing d = drawing(Counting(clip, calls), 64, 64, viewport(0, 0, 64, 64));
+    const Drawing d = drawing(Counting(clip), 64, 64, viewport(0, 0, 64, 64));
     CHECK_EQ(d.count.shaded, d.seen());
     CHECK_EQ(d.count.triangles, 301);
     CHECK(d.count.covered > 2 * d.count.shaded);
@@ -138,30 +132,26 @@ TEST("depth and barycentric coordinates against long double, w from 1e-3 to 1e3"
         seen.clear();
         drawing(Recording(clip), size, size, viewport(0, 0, size, size));
         // Screen-space barycentric coordinates, then the division by w of each corner, all in long double.
-        using wide = long double;
-        wide X[3], Y[3], Z[3], W[3];
+        using wide3 = vec<3, long double>;
+        wide3 W, corner[3];  // on the screen
         for (int i = 0; i < 3; i++) {
             W[i] = clip[i].w;
-            X[i] = (clip[i].x / W[i] + 1) * size / 2, Y[i] = (clip[i].y / W[i] + 1) * size / 2;
-            Z[i] = (clip[i].z / W[i] + 1) * wide(screen_depth) / 2;
+            corner[i] = {(clip[i].x / W[i] + 1) * size / 2, (clip[i].y / W[i] + 1) * size / 2,
+                         (clip[i].z / W[i] + 1) * screen_depth / 2};
         }
-        const wide area = (X[1] - X[0]) * (Y[2] - Y[0]) - (X[2] - X[0]) * (Y[1] - Y[0]);
-        if (std::fabs(area) < 1) continue;  // needles have their own test
+        const auto area = [](const wide3& a, const wide3& b, const wide3& c) { return cross(b - a, c - a).z; };
+        const long double whole = area(corner[0], corner[1], corner[2]);
+        if (std::fabs(whole) < 1) continue;  // needles have their own test
         for (const auto& [at, bar] : seen) {
             CHECK(bar.x >= 0 && bar.y >= 0 && bar.z >= 0);
             CHECK_NEAR(bar.x + bar.y + bar.z, 1, 1e-15);
-            wide l[3], z = 0, sum = 0;
-            bool well_inside = true;  // by more than the snapping of the corners
-            for (int i = 0; i < 3; i++) {
-                const int j = (i + 1) % 3, m = (i + 2) % 3;
-                l[i] = ((X[j] - at.x) * (Y[m] - at.y) - (X[m] - at.x) * (Y[j] - at.y)) / area;
-                z += l[i] * Z[i];
-                sum += l[i] / W[i];
-                well_inside &= l[i] > 1e-3L;
-            }
-            if (!well_inside) continue;
-            CHECK_NEAR(at.z, static_cast<double>(z), 1e-8);
-            for (int i = 0; i < 3; i++) CHECK_NEAR(bar[i], static_cast<double>(l[i] / W[i] / sum), 1e-10);
+            const wide3 p{at.x, at.y, at.z};
+            const wide3 l = wide3{area(p, corner[1], corner[2]), area(corner[0], p, corner[2]),
+                                  area(corner[0], corner[1], p)} / whole;
+            if (!(std::min({l.x, l.y, l.z}) > 1e-3L)) continue;  // within the snapping of the corners
+            const wide3 z{corner[0].z, corner[1].z, corner[2].z}, q{l.x / W.x, l.y / W.y, l.z / W.z};
+            CHECK_NEAR(at.z, static_cast<double>(dot(l, z)), 1e-8);
+            for (int i = 0; i < 3; i++) CHECK_NEAR(bar[i], static_cast<double>(q[i] / (q.x + q.y + q.z)), 1e-10);
         }
     }
 }
@@ -245,13 +235,9 @@ TEST("texels: nearest, wrapped, v upwards; grey is grey in all channels") {
         CHECK(c[0][0] == c[1][0] && c[0][0] == c[2][0]);
         return static_cast<int>(c[0][lanes - 1]);
     };
-    CHECK_EQ(texel(0, 0), 0);
-    CHECK_EQ(texel(.26, .2), 1);
-    CHECK_EQ(texel(.99, .99), 7);
-    CHECK_EQ(texel(1, 1), 0);
-    CHECK_EQ(texel(-.01, -.01), 7);
-    CHECK_EQ(texel(-1e-20, 5.6), 7);
-    CHECK_EQ(texel(1e300, -1e300), 0);
+    constexpr struct { double u, v; int texel; } cases[] = {
+        {0, 0, 0}, {.26, .2, 1}, {.99, .99, 7}, {1, 1, 0}, {-.01, -.01, 7}, {-1e-20, 5.6, 7}, {1e300, -1e300, 0}};
+    for (const auto& [u, v, expected] : cases) CHECK_EQ(texel(u, v), expected);
 }
 
 TEST("integer powers") {
