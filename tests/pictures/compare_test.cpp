@@ -2,11 +2,8 @@
 // the README's pictures are PNG files.
 #include "compare.h"
 
-#include "check.h"
-#include "files.h"
 #include "png.h"
-
-#include <cstdlib>
+#include "run.h"
 
 namespace fs = std::filesystem;
 
@@ -47,11 +44,9 @@ TEST("the figures are those of the pixels that differ") {
 }
 
 TEST("the difference picture shows eight times the difference") {
-    const TGAImage picture = difference_picture(reference, changed(changed(reference, 0, 0, 2, 5), 1, 0, 1, 40));
-    TGAImage expected(50, 40, TGAImage::RGB);
-    expected.set(0, 0, {{0, 0, 40}});
-    expected.set(1, 0, {{0, 255, 0}});
-    CHECK(compare(picture, expected).same());
+    const TGAImage other = changed(changed(reference, 0, 0, 2, 5), 1, 0, 1, 40);
+    TGAImage expected = changed(changed(TGAImage(50, 40, TGAImage::RGB), 0, 0, 2, 40), 1, 0, 1, 255);
+    CHECK(compare(difference_picture(reference, other), expected).same());
 
     const TGAImage alpha = checkered(3, 3, TGAImage::RGBA);
     expected = TGAImage(3, 3, TGAImage::RGB);
@@ -98,20 +93,17 @@ TEST("a picture passes where it is its reference, and else it is said why not") 
     check(reference, false, "no reference: " + file.string() + ": byte 3: the header is truncated");
 }
 
-// The command itself, run by the shell, which also says whether its status is the expected one.
 TEST("the command says how pictures differ, and its status whether") {
-    const TemporaryFolder folder("compare_test");
+    const Folder folder;
     const TGAImage wrong = changed(reference, 7, 3, 2, 5);
     reference.write_tga_file(folder / "a.tga");
     reference.write_tga_file(folder / "b.tga", false);
     wrong.write_tga_file(folder / "c.tga");
     checkered(5, 5, TGAImage::RGB).write_tga_file(folder / "d.tga");
     const auto check = [&](const std::string& files, int status, const std::string& output) {
-        const std::string test = "; test $? -eq " + std::to_string(status);
-        const std::string command = "cd \"" + folder.path().string() + "\"; \"" UMBRA_COMPARE_PICTURES "\" ";
-        CHECK_EQ(std::system((command + files + " > out 2>&1" + test).c_str()), 0);
-        const Bytes text = read_bytes(folder / "out");
-        CHECK_EQ(std::string(text.begin(), text.end()).substr(0, output.size()), output);
+        const Outcome o = folder.run(files);
+        CHECK_EQ(o.status, status);
+        CHECK_EQ((o.out + o.err).substr(0, output.size()), output);
     };
     check("a.tga b.tga", 0, "all 2000 pixels are the same\n");
     check("a.tga c.tga diff.tga", 1, "1 of 2000 pixels differ, by 5 at most, at 7,3\n");
