@@ -202,8 +202,7 @@ SCENE(edge_rule, "--size 96x96 --shadow off --no-fit --eye 0,0,4 --light 0,0,1")
     for (const int colour : {0, 1})
         for (int half : {0, 1})
             for (int y = 0; y < 9; y++)
-                for (int x = 0; x < 9; x++) {
-                    if ((x + y) % 2 != colour) continue;
+                for (int x = (y + colour) % 2; x < 9; x += 2) {
                     const auto at = [&](int i, int j) {
                         return vec3{(8 * (x + i) - 35.5) / 36, (8 * (y + j) - 35.5) / 36, 0};
                     };

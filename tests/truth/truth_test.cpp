@@ -15,12 +15,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-vec3 unit(Random& random) {
-    for (;;) {
-        const vec3 v = random.point(1);
-        if (norm(v) > .1 && norm(v) < 1) return normalized(v);
-    }
-}
+vec3 unit(Random& random) { return normalized(random.point(1)); }
 
 // ---- meshes ----
 
