@@ -275,8 +275,8 @@ SCENE(concave_polygons, "--size 96x96 --shadow off --eye 0,0,4 --light 0,0,1") {
                          {-.328802, .44438, 0}, {-.072005, .63905, 0}, {-.394196, .64562, 0}});
     s.polygon("red", {{.05, .1, 0}, {.5, .4, 0}, {.95, .1, 0}, {.5, .95, 0}});
     s.polygon("cyan", {{-.9, -.95, 0}, {.9, -.95, 0}, {.9, -.1, 0}, {-.6, -.1, 0}, {-.6, -.65, 0}, {.5, -.65, 0},
-                 {.5, -.4, 0}, {-.3, -.4, 0}, {-.3, -.3, 0}, {.65, -.3, 0}, {.65, -.8, 0}, {-.75, -.8, 0},
-                 {-.75, 0, 0}, {-.9, 0, 0}});
+                       {.5, -.4, 0}, {-.3, -.4, 0}, {-.3, -.3, 0}, {.65, -.3, 0}, {.65, -.8, 0}, {-.75, -.8, 0},
+                       {-.75, 0, 0}, {-.9, 0, 0}});
 }
 
 // ---- where the viewer is ----
@@ -487,6 +487,7 @@ TEST("a wrong bias or camera is another picture") {
     const auto same = [&](const std::string& arguments) {
         return compare(yard.draw("--size 128x128 --shadow-size 512 --light 1,1,.6 " + arguments), reference).same();
     };
+    CHECK(same("--eye 1,1.8,5"));
     for (const auto* wrong : {"--eye 1,1.8,5 --bias 200", "--eye 1.01,1.8,5", "--eye 1,1.81,5"}) CHECK(!same(wrong));
 }
 
