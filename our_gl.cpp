@@ -634,8 +634,8 @@ struct Pass {
             select(nearer, z, old).store(depth + at);
             if (picture) select(nearer, mark, pack<std::int32_t>::load(&w.nearest[at])).store(&w.nearest[at]);
         };
-        // Then dx and dy are below 120 pixels and no corner is more than 124 from a pixel of the box: two products, without
-        // the bits that are cut off, add up to less than 2 * 120 * 124 * 2^16 < 2^31.
+        // Then dx and dy are below 120 pixels and no corner is more than 124 from a pixel of the box: two products,
+        // without the bits that are cut off, add up to less than 2 * 120 * 124 * 2^16 < 2^31.
         if (farthest < 60 * one && face.xmax - face.xmin < 4 * lanes)
             return for_each_in_box(face, edges, y_first, y_last + 1, visit);
         return for_each_in_spans(face, edges, y_first, y_last + 1, visit);
