@@ -152,7 +152,7 @@ INLINED bool any(const mask& a) {
     }
 COMPARING(float, <) COMPARING(float, >) COMPARING(float, ==)
 COMPARING(double, <) COMPARING(double, >) COMPARING(double, ==)
-COMPARING(std::int32_t, <) COMPARING(std::int32_t, >) COMPARING(std::int64_t, >)
+COMPARING(std::int32_t, <) COMPARING(std::int32_t, >) COMPARING(std::int32_t, ==)
 #undef COMPARING
 
 // a where the mask says yes, b elsewhere. Numbers alone are taken for reals.

@@ -756,6 +756,11 @@ int LightGrid::good_cells(const std::vector<Model>& models) {
     return std::clamp(static_cast<int>(std::sqrt(faces / 2.)), 1, 2048);
 }
 
+// Twice the area of a triangle on the light's screen, positive where it is counterclockwise there.
+static double area2(const vec3& a, const vec3& b, const vec3& c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
 LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int cells) : cells_(cells) {
     const mat4 to_screen = light.to_screen();
     std::vector<int> first_vert{0}, first_face{0};
@@ -773,15 +778,15 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
     });
     for (const vec3& v : verts_) zmax_ = std::max(zmax_, std::fabs(v.z));
 
-    // The cells of a face's box.
-    struct Box {
-        int x0, x1, y0, y1;
+    // The cells of each face's box, and the float above its largest z.
+    struct Extent {
+        std::int16_t x0, x1, y0, y1;
+        float zmax;
+        int cells() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
     };
-    const auto cell_of = [&](double v) { return v > 0 ? static_cast<int>(std::min(v, cells_ - 1.)) : 0; };  // NaN: 0
-    const auto box_of = [&](int face) {
-        const vec3 &a = verts_[faces_[face][0]], &b = verts_[faces_[face][1]], &c = verts_[faces_[face][2]];
-        return Box{cell_of(std::min({a.x, b.x, c.x})), cell_of(std::max({a.x, b.x, c.x})),
-                   cell_of(std::min({a.y, b.y, c.y})), cell_of(std::max({a.y, b.y, c.y}))};
+    std::vector<Extent> extents(faces_.size());
+    const auto cell_of = [&](double v) {  // NaN: 0
+        return v > 0 ? static_cast<std::int16_t>(std::min(v, cells_ - 1.)) : std::int16_t{0};
     };
     // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a
     // face, the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of
@@ -791,9 +796,13 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
         std::atomic<std::int64_t> sum = 0;
         in_parts(first_face, [&](int, int m, int begin, int end, int) {
             std::int64_t own = 0;
-            for (int i = begin; i < end; i++) {
-                const Box box = box_of(first_face[m] + i);
-                own += std::int64_t{box.x1 - box.x0 + 1} * (box.y1 - box.y0 + 1);
+            for (int i = first_face[m] + begin; i < first_face[m] + end; i++) {
+                const vec3 &a = verts_[faces_[i][0]], &b = verts_[faces_[i][1]], &c = verts_[faces_[i][2]];
+                const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
+                const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
+                const float zmax = std::nextafter(static_cast<float>(std::max({a.z, b.z, c.z})), INFINITY);
+                extents[i] = {cell_of(x0), cell_of(x1), cell_of(y0), cell_of(y1), zmax};
+                own += extents[i].cells();
             }
             sum += own;
         });
@@ -802,22 +811,20 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
         for (vec3& v : verts_) v.x /= 2, v.y /= 2;
     }
 
-    // The cells on the rows [y_begin, y_end) that a face touches: those of its box that lie on the inner side of its
-    // three edges, at least in part. A face that the light sees edge-on casts no shadow.
+    // The cells on the rows [y_begin, y_end) that a face touches: of a larger box those that lie on the inner side of
+    // its three edges, at least in part; asking costs more than it saves for a small one.
     const auto for_each_cell = [&](int face, int y_begin, int y_end, auto&& visit) {
+        const Extent& box = extents[face];
+        const bool is_small = box.cells() <= 9;
         const vec3* const p[] = {&verts_[faces_[face][0]], &verts_[faces_[face][1]], &verts_[faces_[face][2]]};
-        const double area = (p[1]->x - p[0]->x) * (p[2]->y - p[0]->y) - (p[1]->y - p[0]->y) * (p[2]->x - p[0]->x);
-        if (!(std::fabs(area) > 0)) return;  // nor one beyond the range of a double
-        const double side = area < 0 ? -1 : 1;
-        const Box box = box_of(face);
-        const bool is_one_cell = box.x0 == box.x1 && box.y0 == box.y1;
-        for (int y = std::max(y_begin, box.y0); y < std::min(y_end, box.y1 + 1); y++) {
+        const double side = is_small ? 1 : area2(*p[0], *p[1], *p[2]);
+        for (int y = std::max<int>(y_begin, box.y0); y < std::min(y_end, box.y1 + 1); y++) {
             for (int x = box.x0; x <= box.x1; x++) {
                 bool outside = false;
-                for (int i = 0; i < 3 && !outside && !is_one_cell; i++) {
+                for (int i = 0; i < 3 && !outside && !is_small; i++) {
                     const vec3 &a = *p[i], &b = *p[(i + 1) % 3];
                     // The cell's corner farthest inwards. Rounding of the products is below 2^-50 of their size.
-                    const double nx = side * (a.y - b.y), ny = side * (b.x - a.x);
+                    const double nx = side < 0 ? b.y - a.y : a.y - b.y, ny = side < 0 ? a.x - b.x : b.x - a.x;
                     const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
                     outside = nx * dx + ny * dy < -(std::fabs(nx * dx) + std::fabs(ny * dy)) * 0x1p-48;
                 }
@@ -825,14 +832,16 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
             }
         }
     };
-    // The cells are filled in bands of rows, each by one thread. Which faces touch a band is found first.
+    // The cells are filled in bands of rows, each by one thread. Which faces touch a band is found first: none that the
+    // light sees edge-on, which casts no shadow, nor one beyond the range of a double.
     band_rows_ = (cells_ + 63) / 64;
     bands_.resize((cells_ + band_rows_ - 1) / band_rows_);
     std::vector<std::vector<std::vector<int>>> touching(parts(first_face));
     for (auto& faces_of_band : touching) faces_of_band.resize(bands_.size());
     in_parts(first_face, [&](int part, int m, int begin, int end, int) {
         for (int face = first_face[m] + begin; face < first_face[m] + end; face++) {
-            const Box box = box_of(face);
+            if (!(std::fabs(area2(verts_[faces_[face][0]], verts_[faces_[face][1]], verts_[faces_[face][2]])) > 0)) continue;
+            const Extent& box = extents[face];
             for (int b = box.y0 / band_rows_; b <= box.y1 / band_rows_; b++) touching[part][b].push_back(face);
         }
     });
@@ -850,9 +859,7 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
         for (std::size_t c = 2; c < first.size(); c++) first[c] += first[c - 1];
         entries.resize(first.back());
         for_each_entry([&](std::size_t c, int face) {
-            const auto [i, j, k] = faces_[face];
-            const double zmax = std::max({verts_[i].z, verts_[j].z, verts_[k].z});
-            entries[first[c + 1]++] = {std::nextafter(static_cast<float>(zmax), INFINITY), face};
+            entries[first[c + 1]++] = {extents[face].zmax, face};
         });
         first.pop_back();
         const auto is_nearer = [](const Entry& p, const Entry& q) {
@@ -869,42 +876,46 @@ std::size_t LightGrid::bytes() const {
     return sum;
 }
 
-bool LightGrid::shadows(const vec3& on_screen, int number) const {
-    const vec3 p{on_screen.x * scale_, on_screen.y * scale_, on_screen.z};
-    if (!(p.x >= 0 && p.y >= 0 && p.x < cells_ && p.y < cells_)) return false;  // beside all casters
-    const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
-    const auto& [first, entries] = bands_[y / band_rows_];
-    const std::size_t c = std::size_t{1} * cells_ * (y % band_rows_) + x;
-    for (std::uint32_t i = first[c]; i < first[c + 1]; i++) {
-        const Entry& e = entries[i];
-        if (double{e.zmax} <= p.z) return false;  // nor do those that follow reach higher
-        if (e.face != number && covers(e.face, p)) return true;
-    }
-    return false;
-}
-
 mask LightGrid::shadows(const vec<3, coord>& on_screen, int number) const {
-    float dark[lanes];
-    for (int i = 0; i < lanes; i++) dark[i] = shadows(vec3{on_screen.x[i], on_screen.y[i], on_screen.z[i]}, number);
-    return real(dark) > 0;
+    const vec<3, coord> p{on_screen.x * scale_, on_screen.y * scale_, on_screen.z};
+    // Beside all casters there is light.
+    const mask inside = (!(p.x < 0)) & (!(p.y < 0)) & (p.x < cells_) & (p.y < cells_);
+    const pack<std::int32_t> x = to_int(select(inside, p.x, 0)), y = to_int(select(inside, p.y, 0));
+    const pack<std::int32_t> cell = select(inside, y * cells_ + x, -1);
+    mask dark = false, left = inside;
+    while (any(left)) {  // most often the neighbours are in one cell
+        int i = 0;
+        while (!left[i]) i++;
+        const mask here = cell == cell[i];
+        left = left & !here;
+        const auto& [first, entries] = bands_[y[i] / band_rows_];
+        const int c = cells_ * (y[i] % band_rows_) + x[i];
+        for (std::uint32_t k = first[c]; k < first[c + 1]; k++) {
+            // What does not reach higher than a point does not shadow it, nor do those that follow.
+            if (!any(here & !dark & (p.z < double{entries[k].zmax}))) break;
+            if (entries[k].face != number) dark = dark | (here & covers(entries[k].face, p));
+        }
+    }
+    return dark;
 }
 
 // Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are
 // the barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls
 // through.
-bool LightGrid::covers(int face, const vec3& p) const {
+mask LightGrid::covers(int face, const vec<3, coord>& p) const {
     const auto [i, j, k] = faces_[face];
-    const vec3 a = verts_[i] - p, b = verts_[j] - p, c = verts_[k] - p;
-    const double u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
-    const bool left = u >= 0 && v >= 0 && w >= 0, right = u <= 0 && v <= 0 && w <= 0;
-    if (!left && !right) return false;
-    const double above = (u * a.z + v * b.z + w * c.z) * (left ? 1 : -1);  // height over p times twice the area
-    if (!(above > 0)) return false;
+    const vec<3, coord> a = verts_[i] - p, b = verts_[j] - p, c = verts_[k] - p;
+    const coord u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
+    const coord least = min(min(u, v), w), most = max(max(u, v), w);
+    const mask left = !(least < 0), right = !(most > 0);
+    const coord above = (u * a.z + v * b.z + w * c.z) * select(left, coord(1), -1);  // height over p times twice the area
+    const mask is_under = (left | right) & (above > 0);
+    if (!any(is_under)) return false;
     // A face in the plane of p's own, its neighbour on a flat wall, is above p by rounding alone. Corners and p are
     // known to eps of their size (cells_ sideways, zmax_ in height): with r and h the largest of the differences
     // sideways and in height, an area is off by 4 r (cells_ + r) eps, and the sum by what follows.
     constexpr double eps = std::numeric_limits<double>::epsilon();
-    double r = 0, h = 0;
-    for (const vec3& d : {a, b, c}) r = std::max({r, std::fabs(d.x), std::fabs(d.y)}), h = std::max(h, std::fabs(d.z));
-    return above > eps * (12 * r * (cells_ + r) * h + 4 * std::fabs(u + v + w) * (zmax_ + h));
+    coord r = 0, h = 0;
+    for (const auto& d : {a, b, c}) r = max(r, max(abs(d.x), abs(d.y))), h = max(h, abs(d.z));
+    return is_under & (above > eps * (12 * r * (cells_ + r) * h + 4 * abs(u + v + w) * (zmax_ + h)));
 }

@@ -232,7 +232,6 @@ public:
     static int good_cells(const std::vector<Model>& models);
 
     // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
-    bool shadows(const vec3& on_screen, int number) const;
     mask shadows(const vec<3, coord>& on_screen, int number) const;
 
     std::size_t bytes() const;
@@ -242,7 +241,7 @@ private:
         float zmax;  // of the face, rounded up
         std::int32_t face;
     };
-    bool covers(int face, const vec3& p) const;
+    mask covers(int face, const vec<3, coord>& p) const;
 
     struct Band {
         std::vector<std::uint32_t> first;  // entries of cell c: first[c] to first[c+1]

@@ -209,7 +209,7 @@ void check_grid(Input& in, const std::vector<Model>& models, const vec3& to_ligh
         // All casters are on the light's screen, but for what a few roundings move a corner; a NaN is beside them all.
         const double rounding = 8 * cells * std::numeric_limits<double>::epsilon();
         const double low = -rounding, high = cells + rounding;
-        const bool dark = grid.shadows(vec3{x, y, z}, in.upto(static_cast<unsigned>(faces)));
+        const bool dark = grid.shadows({x, y, z}, in.upto(static_cast<unsigned>(faces)))[0];
         REQUIRE(!dark || (x >= low && y >= low && x <= high && y <= high));
     }
     // 64 places in lists for each face, and its three corners.
