@@ -753,7 +753,7 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
 int LightGrid::good_cells(const std::vector<Model>& models) {
     int faces = 0;
     for (const Model& model : models) faces += model.nfaces();
-    return std::clamp(static_cast<int>(std::sqrt(faces / 2.)), 1, 2048);
+    return std::clamp(static_cast<int>(std::sqrt(faces / 8.)), 1, 2048);
 }
 
 // Twice the area of a triangle on the light's screen, positive where it is counterclockwise there.
@@ -840,7 +840,8 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
     for (auto& faces_of_band : touching) faces_of_band.resize(bands_.size());
     in_parts(first_face, [&](int part, int m, int begin, int end, int) {
         for (int face = first_face[m] + begin; face < first_face[m] + end; face++) {
-            if (!(std::fabs(area2(verts_[faces_[face][0]], verts_[faces_[face][1]], verts_[faces_[face][2]])) > 0)) continue;
+            const auto [i, j, k] = faces_[face];
+            if (!(std::fabs(area2(verts_[i], verts_[j], verts_[k])) > 0)) continue;
             const Extent& box = extents[face];
             for (int b = box.y0 / band_rows_; b <= box.y1 / band_rows_; b++) touching[part][b].push_back(face);
         }
@@ -908,7 +909,8 @@ mask LightGrid::covers(int face, const vec<3, coord>& p) const {
     const coord u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
     const coord least = min(min(u, v), w), most = max(max(u, v), w);
     const mask left = !(least < 0), right = !(most > 0);
-    const coord above = (u * a.z + v * b.z + w * c.z) * select(left, coord(1), -1);  // height over p times twice the area
+    // The height over p times twice the area.
+    const coord above = (u * a.z + v * b.z + w * c.z) * select(left, coord(1), -1);
     const mask is_under = (left | right) & (above > 0);
     if (!any(is_under)) return false;
     // A face in the plane of p's own, its neighbour on a flat wall, is above p by rounding alone. Corners and p are
