@@ -390,6 +390,7 @@ const pack<std::int32_t> lane_numbers = [] {
     for (int i = 0; i < lanes; i++) numbers[i] = i;
     return pack<std::int32_t>(numbers);
 }();
+const coord lane_coords = to_coord(lane_numbers);
 
 // The edge function of two corners is twice a signed area: positive inside; where it is zero the pixel's centre lies on
 // the edge and belongs to it if the edge is a left one (it runs down) or a top one (it runs left), so that of two
@@ -625,14 +626,15 @@ struct Pass {
 
         const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
         const pack<std::int32_t> mark(static_cast<int>(w.faces.size()));
-        const auto visit = [&](int x0, int y, const mask& inside) {
+        std::int32_t* const nearest = picture ? w.nearest.data() : nullptr;
+        const auto visit = [&, row_length = std::ptrdiff_t{stride}](int x0, int y, const mask& inside) {
             const coord z_row = face.zy * (y - face.ymin) + face.z0;
-            const std::ptrdiff_t at = std::ptrdiff_t{stride} * (y - y_begin) + x0;
-            const real z = to_real(min(max(zx * to_coord(lane_numbers + (x0 - face.xmin)) + z_row, zmin), zmax));
+            const std::ptrdiff_t at = row_length * (y - y_begin) + x0;
+            const real z = to_real(min(max(zx * (lane_coords + (x0 - face.xmin)) + z_row, zmin), zmax));
             const real old = real::load(depth + at);
             const mask nearer = (z > old) & inside;
             select(nearer, z, old).store(depth + at);
-            if (picture) select(nearer, mark, pack<std::int32_t>::load(&w.nearest[at])).store(&w.nearest[at]);
+            if (nearest) select(nearer, mark, pack<std::int32_t>::load(nearest + at)).store(nearest + at);
         };
         // Then dx and dy are below 120 pixels and no corner is more than 124 from a pixel of the box: two products,
         // without the bits that are cut off, add up to less than 2 * 120 * 124 * 2^16 < 2^31.
@@ -693,12 +695,11 @@ struct Pass {
         const coord sum = f.bar.x + f.bar.y + f.bar.z, share = 1 / sum;
         for (int i = 0; i < 3; i++) f.bar[i] = select(sum > 0, f.bar[i] * share, i == 0);
         const Color color = own.fragment(f);
-        std::int32_t bgr[3][lanes];
-        for (int k = 0; k < 3; k++) to_int(min(color[k], 255)).store(bgr[k]);
-        for (int i = 0; i < n; i++) {
-            std::uint8_t* const pixel = picture->pixel(xs[i], ys[i]);
-            for (int k = 0; k < 3; k++) pixel[k] = static_cast<std::uint8_t>(bgr[k][i]);
-        }
+        pack<std::int32_t> byte[3];
+        for (int k = 0; k < 3; k++) byte[k] = to_int(min(color[k], 255));
+        std::int32_t bgr[lanes];
+        (byte[0] + byte[1] * 256 + byte[2] * 65536).store(bgr);
+        for (int i = 0; i < n; i++) std::memcpy(picture->pixel(xs[i], ys[i]), &bgr[i], 3);
     }
 };
 
