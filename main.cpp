@@ -23,6 +23,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     enum class Draw { color, shadow, normal } draw = Draw::color;
     std::vector<std::filesystem::path> models;
     std::filesystem::path out = ".";
+    enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
     bool tangent = false, fit = true, quiet = false, help = false, version = false;
     int threads = thread_count(), frames = 1;
 };
@@ -41,6 +42,7 @@ struct DepthShader final : IShader {  // only the z-buffer is wanted: there is n
 };
 
 struct Shadow {                    // what the first pass leaves for the second
+    Options::Method method = Options::Method::off;  // off where nothing can throw a shadow onto what is seen
     mat4 M = mat4::identity();     // Viewport*Projection*ModelView of the light: from object space to its screen
     DepthBuffer shadowbuffer;      // what is nearest to the light there ...
     LightGrid grid;                // ... or, for exact shadows, all faces
@@ -59,6 +61,7 @@ struct PhongShader final : IShader {
     mat4 uniform_MIT;          // ModelView.invert_transpose(), carries normals where ModelView carries points
     mat4 uniform_Mshadow;      // from the viewer's screen to the shadow buffer's
     vec3 uniform_l;            // light vector: towards the light, of length 1
+    int grid_face;             // the number of the model's first face in the grid of exact shadows
     const Material* material;  // the face's: written by varying(), read by fragment(), as what follows
     vec2 varying_uv[3];        // texture coordinates of a triangle
     vec3 varying_nrm[3];       // normals of the vertices
@@ -69,7 +72,8 @@ struct PhongShader final : IShader {
         : IShader(m), opt(o), shadow(s), uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
           uniform_MIT(invert_transpose(uniform_M).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
-          uniform_l(normalized((uniform_M * direction(normalized(opt.light_dir))).xyz())) {}
+          uniform_l(normalized((uniform_M * direction(normalized(opt.light_dir))).xyz())),
+          grid_face(shadow.grid.first_face(m)) {}
 
     vec4 vertex(int vert) const override { return uniform_PM * point(model.vert(vert)); }
 
@@ -109,9 +113,9 @@ struct PhongShader final : IShader {
     }
 
     mask in_light(const Fragment& f) const {
-        if (opt.method == Options::Method::off) return true;
-        if (opt.method == Options::Method::exact)
-            return !shadow.grid.shadows(interpolated(varying_sb, f.bar), f.face);
+        if (shadow.method == Options::Method::off) return true;
+        if (shadow.method == Options::Method::exact)
+            return !shadow.grid.shadows(interpolated(varying_sb, f.bar), grid_face + f.face);
         const vec<3, coord> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
         const coord stored = shadow.shadowbuffer.at(sb_p);
         // With --bias 0 surfaces shadow themselves here and there: z-fighting. The text's cure is --bias 43.34.
@@ -140,34 +144,38 @@ struct PhongShader final : IShader {
 
 // ---- the two passes ----
 
-// Rendering the shadow buffer: the camera stands at the light. It is fitted to the models, so that no texel is wasted;
+static Camera viewer(const Options& opt) {
+    return {lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
+            middle_viewport(opt.width, opt.height)};
+}
+
+// Rendering the shadow buffer: the camera stands at the light. It is fitted to the casters, so that no texel is wasted;
 // but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
-static void first_pass(const Options& opt, const std::vector<Model>& models, Shadow& shadow) {
-    if (opt.method == Options::Method::off) return;
+static void first_pass(const Options& opt, const Models& casters, Shadow& shadow) {
+    if (casters.empty()) return;
+    shadow.method = opt.method;
     const bool exact = opt.method == Options::Method::exact, classic = opt.bias && !exact;
-    const int size = exact ? LightGrid::good_cells(models) : opt.shadow_size;
+    const int size = exact ? LightGrid::good_cells(casters) : opt.shadow_size;
     Camera light{lookat(opt.light_dir, opt.center, opt.up), projection(0), middle_viewport(size, size)};
-    if (!classic) light = fitted(light, models, size);
+    if (!classic) light = fitted(light, casters, size);
     shadow.M = light.to_screen();
     if (exact) {
-        shadow.grid = LightGrid(models, light, size);
+        shadow.grid = LightGrid(casters, light, size);
         return;
     }
     if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;  // M stays: drawn aside, read in place
     std::vector<DepthShader> shaders;
-    for (const Model& model : models) shaders.emplace_back(model, light);
+    for (const Model* model : casters) shaders.emplace_back(*model, light);
     if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);  // kept from frame to frame
     draw(shaders, light.Viewport, shadow.shadowbuffer);
 }
 
 // Rendering the frame buffer: the camera stands at the viewer, and each fragment asks whether the light sees it too.
-static Counters second_pass(const Options& opt, const std::vector<Model>& models, const Shadow& shadow,
-                            TGAImage& frame) {
-    const Camera viewer{lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
-                        middle_viewport(opt.width, opt.height)};
+static Counters second_pass(const Options& opt, const Models& seen, const Shadow& shadow, TGAImage& frame) {
+    const Camera camera = viewer(opt);
     std::vector<PhongShader> shaders;
-    for (const Model& model : models) shaders.emplace_back(opt, shadow, viewer, model);
-    return draw(shaders, viewer.Viewport, frame);
+    for (const Model* model : seen) shaders.emplace_back(opt, shadow, camera, *model);
+    return draw(shaders, camera.Viewport, frame);
 }
 
 // ==== the program around the lesson: the command line and the files ====
@@ -232,6 +240,8 @@ static const Option options[] = {
      [](Options& o, const Value& v) { v.read(o.bias.emplace()); }},
     {"--draw", "WHAT", "color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)",
      [](Options& o, const Value& v) { o.draw = Options::Draw(v.one_of({"color", "shadow", "normal"})); }},
+    {"--only", "WHAT", "framebuffer, or depth: one of the two pictures, without what it does not need (both)",
+     [](Options& o, const Value& v) { o.only = Options::Only(v.one_of({"both", "framebuffer", "depth"})); }},
     {"--tangent", "", "prefer a tangent-space normal map to an object-space one",
      [](Options& o, const Value&) { o.tangent = true; }},
     {"--no-fit", "", "keep a model's own coordinates (default: fit what is beyond [-1,1]^3 or too small to see)",
@@ -263,6 +273,8 @@ static Options parse(int argc, char** argv) {
     }
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
     if (opt.light_dir == vec3{}) throw UsageError("--light has no direction");
+    if (opt.only == Options::Only::depth && opt.method != Options::Method::map)
+        throw UsageError("--only depth: there is no shadow buffer without --shadow map");
     if (opt.models.empty()) opt.models.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     return opt;
 }
@@ -281,23 +293,42 @@ static int complain(std::string what, int status) {
     return status;
 }
 
-static std::vector<Model> load(const Options& opt) {
+struct Scene {
     std::vector<Model> models;
+    Models seen;     // by the viewer: only these are shaded, and have textures
+    Models casters;  // may throw a shadow onto what is seen
+};
+
+static Scene load(const Options& opt) {
+    Scene scene;
     for (const auto& path : opt.models) {
-        Model& model = models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
+        Model& model = scene.models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
         if (opt.fit) model.fit();
         model.move(-opt.center);
-        for (const std::string& note : model.notes())
-            if (!opt.quiet) complain(path.string() + ": " + note, 0);
     }
-    return models;
+    return scene;
+}
+
+// What the scene does not need is left out from here on.
+static void leave_out(const Options& opt, Scene& scene) {
+    scene.seen = seen_by(viewer(opt), scene.models, opt.width, opt.height);
+    if (opt.method != Options::Method::off)
+        scene.casters = casters(scene.models, scene.seen, lookat(opt.light_dir, opt.center, opt.up));
+    if (opt.only == Options::Only::depth) scene.seen.clear();
+    for (std::size_t i = 0; i < scene.models.size(); i++) {
+        Model& model = scene.models[i];
+        if (std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures();
+        for (const std::string& note : model.notes())
+            if (!opt.quiet) complain(opt.models[i].string() + ": " + note, 0);
+    }
 }
 
 // Writes both pictures or, where one does not fit on the disk, none.
 static void write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
     std::vector<TGAFile> files;
-    if (shadow.shadowbuffer.width()) files.emplace_back(depth_picture(shadow.shadowbuffer), opt.out / "depth.tga");
-    files.emplace_back(frame, opt.out / "framebuffer.tga");
+    if (shadow.shadowbuffer.width() && opt.only != Options::Only::framebuffer)
+        files.emplace_back(depth_picture(shadow.shadowbuffer), opt.out / "depth.tga");
+    if (opt.only != Options::Only::depth) files.emplace_back(frame, opt.out / "framebuffer.tga");
     for (TGAFile& file : files) file.commit();
 }
 
@@ -312,9 +343,10 @@ static double median(std::vector<double>& values) {
 
 static void run(Options opt) {
     const double start = milliseconds();
-    const std::vector<Model> models = load(opt);
+    Scene scene = load(opt);
     // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
+    leave_out(opt, scene);
     const double loaded = milliseconds();
     Shadow shadow;
     TGAImage frame(opt.width, opt.height, TGAImage::RGB);
@@ -322,22 +354,24 @@ static void run(Options opt) {
     std::vector<double> depth_ms, shade_ms;
     for (int i = 0; i < opt.frames; i++) {
         const double began = milliseconds();
-        first_pass(opt, models, shadow);
+        first_pass(opt, scene.casters, shadow);
         const double first = milliseconds();
-        c = second_pass(opt, models, shadow, frame);
+        if (opt.only != Options::Only::depth) c = second_pass(opt, scene.seen, shadow, frame);
         depth_ms.push_back(first - began), shade_ms.push_back(milliseconds() - first);
     }
     const double drawn = milliseconds();
     write(opt, shadow, frame);
     const double written = milliseconds();
     if (opt.quiet) return;
-    std::string left_out = missing_maps(models);
-    if (opt.method == Options::Method::off) left_out += left_out.empty() ? "shadow" : ",shadow";
+    std::string left_out = missing_maps(scene.models);
+    if (scene.casters.empty()) left_out += left_out.empty() ? "shadow" : ",shadow";
+    if (left_out.empty()) left_out = "-";
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
-                "shadow_bytes %zu outside %ld between_samples %ld hidden %ld left_out %s\n",
+                "shadow_bytes %zu outside %ld between_samples %ld hidden %ld models %zu seen %zu casters %zu "
+                "left_out %s\n",
                 c.triangles, c.shaded, c.shaded, loaded - start, median(depth_ms), median(shade_ms), written - drawn,
                 shadow.shadowbuffer.bytes() + shadow.grid.bytes(), c.outside, c.between_samples, c.covered - c.shaded,
-                left_out.empty() ? "-" : left_out.c_str());
+                scene.models.size(), scene.seen.size(), scene.casters.size(), left_out.c_str());
 }
 
 int main(int argc, char** argv) try {

@@ -615,12 +615,9 @@ std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, st
 
 // ---- textures ----
 
-// By path, and of each of the materials that use it: its index, and which map the picture is.
-using Pictures = std::map<std::string, std::vector<std::pair<int, Map Material::*>>>;
-
 // Adds what a group of faces needs: from the .mtl, and where that names none, the pictures beside the model.
-void plan_pictures(const fs::path& path, const Model::Group& group, Obj& obj, const MtlMaterial& mtl,
-                   const std::string& name, NormalMap wanted, Pictures& pictures, Notes& notes) {
+void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, const MtlMaterial& mtl,
+                   const std::string& name, NormalMap wanted, Model::Textures& textures, Notes& notes) {
     std::string maps[map_count];
     for (int i = 0; i < map_count; i++) {
         const fs::path picture = fs::path(path).replace_extension() += map_suffixes[i];
@@ -634,27 +631,10 @@ void plan_pictures(const fs::path& path, const Model::Group& group, Obj& obj, co
                                      [](const Corner& c) { return c.uv >= 0; });
     notes.insert(notes.end(), mtl.notes.begin(), mtl.notes.end());
     for (int i = 0; i < map_count; i++)
-        if (!maps[i].empty() && has_uvs) pictures[maps[i]].push_back({group.material, map_members[i]});
+        if (!maps[i].empty() && has_uvs) textures[maps[i]].push_back({group.material, map_members[i]});
     if (!has_uvs && std::any_of(maps, maps + map_count, [](const std::string& map) { return !map.empty(); }))
         notes.push_back((name.empty() ? "" : "material " + in_quotes(name) + ": ") +
                         "no texture coordinates, so no textures");
-}
-
-// Decodes each picture once, as many at a time as there are cores, and hands it to the materials. What is thrown is the
-// error of the first bad one in the order of their paths.
-void load_pictures(const Pictures& pictures, std::vector<Material>& materials, Notes& notes) {
-    std::deque<std::future<TGAImage>> started;
-    auto next = pictures.begin();
-    for (const auto& [path, uses] : pictures) {
-        for (; next != pictures.end() && started.size() < std::max(1u, std::thread::hardware_concurrency()); next++)
-            started.push_back(std::async(TGAImage::read_tga_file, next->first));
-        const auto picture = std::make_shared<const TGAImage>(started.front().get());
-        started.pop_front();
-        for (const auto& [material, map] : uses)
-            if (picture->bytespp() == 1 && (map == &Material::normal || map == &Material::tangent))
-                notes.push_back(fs::path(path).filename().string() + " is grey, so no normal map: left out");
-            else materials[material].*map = picture;
-    }
 }
 
 }  // namespace
@@ -672,18 +652,9 @@ Model::Model(const fs::path& path, NormalMap wanted) {
 
     const Library library = read_libraries(path, obj.libraries, notes_);
     groups_ = group_by_material(obj, library, materials_, notes_);
-    Pictures pictures;
     for (const Group& g : groups_) {
         const std::string& name = materials_[g.material].name;
-        plan_pictures(path, g, obj, library.at(name), name, wanted, pictures, notes_);
-    }
-    load_pictures(pictures, materials_, notes_);
-
-    std::set<std::string> seen;
-    std::erase_if(notes_, [&](const std::string& note) { return !seen.insert(note).second; });
-    if (notes_.size() > 20) {
-        notes_[20] = "and " + std::to_string(notes_.size() - 20) + " more like these";
-        notes_.resize(21);
+        plan_textures(path, g, obj, library.at(name), name, wanted, textures_, notes_);
     }
     // A vertex that no face uses may be anywhere. It is put where another is, so that all can be measured and moved.
     std::vector<bool> is_used(obj.verts.size());
@@ -694,13 +665,44 @@ Model::Model(const fs::path& path, NormalMap wanted) {
     normals_ = std::move(obj.normals);
     uvs_ = std::move(obj.uvs);
     corners_ = std::move(obj.corners);
+    find_box();
+}
+
+// As many at a time as there are cores. What is thrown is the error of the first bad one in the order of their paths.
+void Model::load_textures() {
+    std::deque<std::future<TGAImage>> started;
+    auto next = textures_.begin();
+    for (const auto& [path, uses] : textures_) {
+        for (; next != textures_.end() && started.size() < std::max(1u, std::thread::hardware_concurrency()); next++)
+            started.push_back(std::async(TGAImage::read_tga_file, next->first));
+        const auto picture = std::make_shared<const TGAImage>(started.front().get());
+        started.pop_front();
+        for (const auto& [material, map] : uses)
+            if (picture->bytespp() == 1 && (map == &Material::normal || map == &Material::tangent))
+                notes_.push_back(fs::path(path).filename().string() + " is grey, so no normal map: left out");
+            else materials_[material].*map = picture;
+    }
+}
+
+std::vector<std::string> Model::notes() const {
+    std::vector<std::string> notes;
+    for (const std::string& note : notes_)
+        if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+    if (notes.size() > 20) {
+        notes[20] = "and " + std::to_string(notes.size() - 20) + " more like these";
+        notes.resize(21);
+    }
+    return notes;
+}
+
+void Model::find_box() {
+    if (!verts_.empty()) low_ = high_ = verts_[0];
+    for (const vec3& v : verts_)
+        for (int i = 0; i < 3; i++) low_[i] = std::min(low_[i], v[i]), high_[i] = std::max(high_[i], v[i]);
 }
 
 bool Model::fit() {
-    if (verts_.empty()) return false;
-    vec3 low = verts_[0], high = low;
-    for (const vec3& v : verts_)
-        for (int i = 0; i < 3; i++) low[i] = std::min(low[i], v[i]), high[i] = std::max(high[i], v[i]);
+    vec3 low = low_, high = high_;
     const double extent = std::max(largest(low), largest(high));
     constexpr double pixel = 2 / (.75 * 16384);  // [-1,1] are three quarters of a picture's side
     const bool invisible = largest(high - low) < pixel && !(low == high);
@@ -717,12 +719,14 @@ bool Model::fit() {
         v = (v - low) - (high - v);  // twice the way from the centre, which itself may be no double
         if (side > 0) v = v / side;
     }
+    find_box();
     notes_.push_back("fitted to [-1,1]^3");
     return true;
 }
 
 void Model::move(const vec3& by) {
     for (vec3& v : verts_) v = v + by;
+    find_box();
 }
 
 std::string missing_maps(const std::vector<Model>& models) {

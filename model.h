@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,23 +37,29 @@ public:
     struct Group {  // the faces [begin,end) share a material
         int begin, end, material;
     };
+    // By path, and of each of the materials that use it: its index, and which map the picture is.
+    using Textures = std::map<std::string, std::vector<std::pair<int, Map Material::*>>>;
 
     Model() = default;
 
-    // Reads an .obj and the textures beside it. Throws std::runtime_error "FILE:LINE: what" (LINE counts from 1),
-    // "FILE: what" for a file that cannot be read or has no face, and what TGAImage::read_tga_file throws.
+    // Reads an .obj with its .mtl, and looks for its textures. Throws std::runtime_error "FILE:LINE: what" (LINE counts
+    // from 1), or "FILE: what" for a file that cannot be read or has no face.
     // Takes at most 256 times the size of the files and 160 KiB. A file must not get shorter while it is read, because
-    // it may be mapped. Concave polygons with more than 1000 corners stay fans, with a note. Textures are decoded where
-    // faces have coordinates of them, each once.
+    // it may be mapped. Concave polygons with more than 1000 corners stay fans, with a note.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
+
+    // Decodes the textures, each once: for models that are seen. Throws what TGAImage::read_tga_file throws.
+    void load_textures();
 
     // Made in memory: three corners a face. It has one material, without maps.
     Model(std::vector<vec3> verts, std::vector<vec2> uvs, std::vector<vec3> normals, std::vector<Corner> corners)
         : verts_(std::move(verts)), normals_(std::move(normals)), uvs_(std::move(uvs)), corners_(std::move(corners)),
-          materials_(1), groups_{{0, nfaces(), 0}} {}
+          materials_(1), groups_{{0, nfaces(), 0}} {
+        find_box();
+    }
 
     // What the user may want to know and is no error, one line each without the file's name at its head.
-    const std::vector<std::string>& notes() const { return notes_; }
+    std::vector<std::string> notes() const;
 
     int nverts() const { return static_cast<int>(verts_.size()); }
     int nfaces() const { return static_cast<int>(corners_.size() / 3); }
@@ -73,19 +80,27 @@ public:
         return materials_[std::upper_bound(groups_.begin(), groups_.end(), face, ends_before)->material];
     }
 
-    // Moves the centre of the bounding box of the used vertices to the origin and scales uniformly so that its largest
-    // half-side is 1, if the box is not within [-1,1]^3 already or is smaller than a pixel of the largest picture.
-    // Returns whether it did, which is a note.
+    // The box of all vertices: a vertex that no face uses has been put where another is.
+    const vec3& low() const { return low_; }
+    const vec3& high() const { return high_; }
+
+    // Moves the centre of the box to the origin and scales uniformly so that its largest half-side is 1, if the box is
+    // not within [-1,1]^3 already or is smaller than a pixel of the largest picture. Returns whether it did, which is a
+    // note.
     bool fit();
 
     void move(const vec3& by);
 
 private:
+    void find_box();
+
     std::vector<vec3> verts_, normals_;
+    vec3 low_, high_;
     std::vector<vec2> uvs_;
     std::vector<Corner> corners_;  // three a face
     std::vector<Material> materials_;
     std::vector<Group> groups_;
+    Textures textures_;
     std::vector<std::string> notes_;
 };
 

@@ -41,12 +41,12 @@ mat4 middle_viewport(int width, int height) {
     return viewport((width - side) / 2, (height - side) / 2, side, side);
 }
 
-Camera fitted(const Camera& camera, const std::vector<Model>& models, int size) {
+Camera fitted(const Camera& camera, const Models& models, int size) {
     constexpr double inf = std::numeric_limits<double>::infinity();
     Camera result{camera.ModelView, mat4::identity(), viewport(0, 0, size, size)};
     vec3 low{inf, inf, inf}, high{-inf, -inf, -inf};
-    for (const Model& model : models) {
-        for (const vec3& v : model.verts()) {
+    for (const Model* model : models) {
+        for (const vec3& v : model->verts()) {
             const vec3 p = (camera.ModelView * point(v)).xyz();
             for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
         }
@@ -61,6 +61,66 @@ Camera fitted(const Camera& camera, const std::vector<Model>& models, int size) 
         if (!(half >= 0x1p-1000)) half = 1;  // no extent, or one whose inverse is no double: any scale will do
         result.Projection[i][i] = 1 / half;
         result.Projection[i][3] = -(low[i] + half) / half;
+    }
+    return result;
+}
+
+namespace {
+
+// A corner of a model's box, transformed, and what rounding may have done to each coordinate.
+struct Corner {
+    vec4 at, off;
+};
+std::array<Corner, 8> box_corners(const Model& model, const mat4& M) {
+    const vec3 sides[] = {model.low(), model.high()};
+    std::array<Corner, 8> corners;
+    for (int k = 0; k < 8; k++) {
+        const vec4 p = point(vec3{sides[k & 1].x, sides[k >> 1 & 1].y, sides[k >> 2].z});
+        corners[k].at = M * p;
+        for (int i = 0; i < 4; i++)
+            for (int j = 0; j < 4; j++) corners[k].off[i] += std::fabs(M[i][j] * p[j]) * 0x1p-48;
+    }
+    return corners;
+}
+
+}  // namespace
+
+Models seen_by(const Camera& camera, const Models& models, int width, int height) {
+    Models seen;
+    for (const Model* model : models) {
+        const auto corners = box_corners(*model, camera.to_screen());
+        const auto all = [&](auto&& beyond) { return std::all_of(corners.begin(), corners.end(), beyond); };
+        // What is no number is beyond nothing.
+        if (all([](const Corner& c) { return c.at.w + c.off.w < 0; }) ||
+            all([](const Corner& c) { return c.at.x + c.off.x < 0; }) ||
+            all([](const Corner& c) { return c.at.y + c.off.y < 0; }) ||
+            all([=](const Corner& c) { return c.at.x - c.off.x > width * (c.at.w + c.off.w); }) ||
+            all([=](const Corner& c) { return c.at.y - c.off.y > height * (c.at.w + c.off.w); }))
+            continue;
+        seen.push_back(model);
+    }
+    return seen;
+}
+
+Models casters(const Models& models, const Models& receivers, const mat4& ModelView) {
+    const auto box = [&](const Model* model) {
+        constexpr double inf = std::numeric_limits<double>::infinity();
+        vec3 low{inf, inf, inf}, high = -low;
+        for (const Corner& c : box_corners(*model, ModelView))
+            for (int i = 0; i < 3; i++) {
+                low[i] = std::min(low[i], c.at[i] - c.off[i]);
+                high[i] = std::max(high[i], c.at[i] + c.off[i]);
+            }
+        return std::pair(low, high);
+    };
+    Models result;
+    for (const Model* model : models) {
+        const auto [low, high] = box(model);
+        const auto may_shadow = [&, l = low, h = high](const Model* receiver) {
+            const auto [from, to] = box(receiver);
+            return !(l.x > to.x || h.x < from.x || l.y > to.y || h.y < from.y || h.z < from.z);
+        };
+        if (std::any_of(receivers.begin(), receivers.end(), may_shadow)) result.push_back(model);
     }
     return result;
 }
@@ -468,7 +528,7 @@ INLINED long for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_
 // ---- drawing ----
 
 struct Face : Coverage {
-    int shader, iface, number;
+    int shader, iface;
 };
 
 // A vertex on the screen: homogeneous, and snapped; point.x is to_be_clipped where it is not within the guard band.
@@ -535,7 +595,7 @@ struct Pass {
             for (std::vector<int>& faces : b.touching) faces.clear();
         }
         in_parts(first_face, [this](int part, int s, int begin, int end, int) {
-            for (int i = begin; i < end; i++) sort_into_strips({{}, s, i, first_face[s] + i}, blocks[part]);
+            for (int i = begin; i < end; i++) sort_into_strips({{}, s, i}, blocks[part]);
         });
         spaces.resize(thread_count());
         for (Workspace& w : spaces) w.count = {};
@@ -575,7 +635,8 @@ struct Pass {
         block.count.triangles++;
         if (n == 0) block.count.outside++;
         else if (!bound(corners, n, width, height, c)) block.count.between_samples++;
-        else for (int s = c.ymin / strip_rows; s <= c.ymax / strip_rows; s++) block.touching[s].push_back(face.number);
+        else for (int s = c.ymin / strip_rows; s <= c.ymax / strip_rows; s++)
+            block.touching[s].push_back(first_face[face.shader] + face.iface);
     }
 
     void draw_strip(int strip, int thread) const {
@@ -588,7 +649,7 @@ struct Pass {
         for (const Block& b : blocks)
             for (const int number : b.touching[strip]) {
                 const int s = model_of(number, first_face);
-                Face face{{}, s, number - first_face[s], number};
+                Face face{{}, s, number - first_face[s]};
                 Screen screen;
                 Point corners[most_corners];
                 const int n = corners_of(face, screen, corners);
@@ -688,7 +749,7 @@ struct Pass {
         const coord x = to_coord(pack<std::int32_t>::load(xs)), y = to_coord(pack<std::int32_t>::load(ys));
         const coord dx = x - face.xmin, dy = y - face.ymin;
         Fragment f;
-        f.face = face.number;
+        f.face = face.iface;
         f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
         // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
         for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
@@ -751,9 +812,9 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
     return max(receiver, caster) + rounding;
 }
 
-int LightGrid::good_cells(const std::vector<Model>& models) {
+int LightGrid::good_cells(const Models& models) {
     int faces = 0;
-    for (const Model& model : models) faces += model.nfaces();
+    for (const Model* model : models) faces += model->nfaces();
     return std::clamp(static_cast<int>(std::sqrt(faces / 8.)), 1, 2048);
 }
 
@@ -762,20 +823,20 @@ static double area2(const vec3& a, const vec3& b, const vec3& c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int cells) : cells_(cells) {
+LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cells_(cells), models_(models) {
     const mat4 to_screen = light.to_screen();
     std::vector<int> first_vert{0}, first_face{0};
-    for (const Model& model : models) {
-        first_vert.push_back(first_vert.back() + model.nverts());
-        first_face.push_back(first_face.back() + model.nfaces());
+    for (const Model* model : models) {
+        first_vert.push_back(first_vert.back() + model->nverts());
+        first_face.push_back(first_face.back() + model->nfaces());
     }
     verts_.resize(first_vert.back()), faces_.resize(first_face.back());
     in_parts(first_vert, [&](int, int m, int begin, int end, int) {
-        for (int i = begin; i < end; i++) verts_[first_vert[m] + i] = project(to_screen * point(models[m].vert(i)));
+        for (int i = begin; i < end; i++) verts_[first_vert[m] + i] = project(to_screen * point(models[m]->vert(i)));
     });
     in_parts(first_face, [&](int, int m, int begin, int end, int) {
         for (int i = begin; i < end; i++)
-            for (int k = 0; k < 3; k++) faces_[first_face[m] + i][k] = first_vert[m] + models[m].corner(i, k).vert;
+            for (int k = 0; k < 3; k++) faces_[first_face[m] + i][k] = first_vert[m] + models[m]->corner(i, k).vert;
     });
     for (const vec3& v : verts_) zmax_ = std::max(zmax_, std::fabs(v.z));
 
@@ -870,6 +931,15 @@ LightGrid::LightGrid(const std::vector<Model>& models, const Camera& light, int 
         for (std::size_t c = 0; c < count; c++)
             std::sort(entries.begin() + first[c], entries.begin() + first[c + 1], is_nearer);
     });
+}
+
+int LightGrid::first_face(const Model& model) const {
+    int first = 0;
+    for (const Model* each : models_) {
+        if (each == &model) return first;
+        first += each->nfaces();
+    }
+    return -model.nfaces();
 }
 
 std::size_t LightGrid::bytes() const {

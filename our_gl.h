@@ -48,9 +48,23 @@ struct Camera {
     }
 };
 
+// Some models of a scene.
+struct Models : std::vector<const Model*> {
+    Models() = default;
+    Models(const std::vector<Model>& all) {
+        for (const Model& model : all) push_back(&model);
+    }
+};
+
 // An orthographic camera, fitted: its projection and viewport are replaced so that the models fill all of size x size
 // pixels and of [0, screen_depth].
-Camera fitted(const Camera& camera, const std::vector<Model>& models, int size);
+Camera fitted(const Camera& camera, const Models& models, int size);
+
+// Those of the models of which the camera may see a part on a picture of so many pixels: judged by their boxes.
+Models seen_by(const Camera& camera, const Models& models, int width, int height);
+
+// Those that may throw a shadow onto a receiver, judged by their boxes as the light's ModelView sees them.
+Models casters(const Models& models, const Models& receivers, const mat4& ModelView);
 
 // ---- the z-buffer ----
 
@@ -96,7 +110,7 @@ TGAImage depth_picture(const DepthBuffer& depths);
 
 // Some neighbouring pixels of one face, one in each lane: what the pipeline hands to IShader::fragment.
 struct Fragment {
-    int face;              // its number among all faces of the pass
+    int face;              // of the model
     vec<3, coord> screen;  // the pixel's centre and the depth there
     vec<3, coord> bar;     // barycentric coordinates on the face itself (perspective undone): each >= 0, their sum is 1
 };
@@ -226,10 +240,13 @@ class LightGrid {
 public:
     LightGrid() = default;
     // The light's screen is cells x cells large and shows all faces. Takes at most 860 bytes a face and 4 a cell.
-    LightGrid(const std::vector<Model>& models, const Camera& light, int cells);
+    LightGrid(const Models& models, const Camera& light, int cells);
 
     // A cell for eight faces: measured up to 2.5 million of them, more take longer to fill than they save.
-    static int good_cells(const std::vector<Model>& models);
+    static int good_cells(const Models& models);
+
+    // The number of a model's first face here; that of no face of it where the model is none of those.
+    int first_face(const Model& model) const;
 
     // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
     mask shadows(const vec<3, coord>& on_screen, int number) const;
@@ -251,6 +268,7 @@ private:
     int band_rows_ = 1;                      // of cells, in a band
     double scale_ = 1;                       // cells to a pixel of the light's screen
     double zmax_ = 0;                        // the largest |z| of all vertices
+    Models models_;
     std::vector<vec3> verts_;                // x and y in cells
     std::vector<std::array<int, 3>> faces_;  // as indices of vertices
     std::vector<Band> bands_;

@@ -127,6 +127,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     start_peak();
     try {
         model = Model(files.obj(), size % 2 ? NormalMap::object : NormalMap::tangent);
+        model.load_textures();
     } catch (const std::runtime_error& e) {  // of a file by its whole path, and nothing of the library's own
         const std::string what = e.what();
         if (!is_one_line(what) || what[0] != '/' || what.find(": ") == what.npos) refuse(what);

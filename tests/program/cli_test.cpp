@@ -57,6 +57,7 @@ TEST("a wrong command line ends with status 2 and one line") {
     };
     const Strings no_vectors{"1,2", "1,2,3,4", "1,2,x", "nan,0,0", "inf,0,0", "1,,2", "''", "1e999,0,0"};
     const std::map<std::string, Strings> wrong_values{
+        {"--only", {"", "frame", "depth.tga"}},
         {"-o", {}}, {"--size", {"5", "5x", "x5", "5x5x5", "axb", "1e3x5", "99999999999x5", "5.5x5"}},
         {"--shadow-size", {"0", "-1", "16385", "x", "1.5"}}, {"--eye", no_vectors}, {"--center", no_vectors},
         {"--up", no_vectors}, {"--light", joined(no_vectors, {"0,0,0"})}, {"--bias", {"x", "1x", "nan", "inf"}},
@@ -119,6 +120,36 @@ TEST("what is not needed is left out, and said") {
     for (const std::string name : {"diffuse", "normal_map", "specular", "glow", "shadow"})
         CHECK(off.out.find(name, off.out.find(" left_out ")) != std::string::npos);
     CHECK_EQ(value(off.out, "shadow_bytes"), 0);
+}
+
+// A wall, a board behind the viewer that shadows a half of it, and something far away whose texture is no picture.
+TEST("a model that is not seen is not shaded, nor are its textures read; it throws a shadow where it can") {
+    const Folder f;
+    const std::string square = "v -1 -1 %\nv 1 -1 %\nv 1 1 %\nv -1 1 %\nvt 0 0\nf 1/1 2/1 3/1 4/1\n";
+    f.write("wall.obj", each(square, {"0"})[0]);
+    f.write("board.obj", "v 0 -9 10\nv 9 -9 10\nv 9 9 10\nv 0 9 10\nf 1 2 3 4\n");
+    f.write("far.obj", "v 99 0 0\nv 100 0 0\nv 99 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+    f.write("far_diffuse.tga", "no picture");
+    for (const std::string shadow : {"map", "exact"}) {
+        const std::string options = small + "--no-fit --eye 0,0,4 --light 0,0,1 --shadow " + shadow + " ";
+        const Outcome all = f.run(options + "far.obj wall.obj board.obj"), some = f.run(options + "wall.obj board.obj");
+        CHECK(all.status == 0 && all.err.empty() && all.same_pictures(some));
+        CHECK(value(all.out, "models") == 3 && value(all.out, "seen") == 1 && value(all.out, "casters") == 2);
+        CHECK_EQ(value(all.out, "triangles"), 2);
+        const Outcome lit = f.run(options + "wall.obj far.obj");
+        CHECK(value(lit.out, "casters") == 1 && lit.frame != all.frame);
+        CHECK_EQ(f.run(options + "--center 99,0,0 --eye 99,0,4 wall.obj far.obj").status, 1);  // now it is seen
+    }
+    const Outcome none = f.run(small + "--no-fit --eye 0,0,4 --center 0,0,8 far.obj");
+    CHECK(none.status == 0 && value(none.out, "seen") == 0 && value(none.out, "shadow_bytes") == 0);
+}
+
+TEST("--only: one of the two pictures, without what it does not need") {
+    const Outcome both = Folder().run(small), frame = Folder().run(small + "--only framebuffer"),
+                  depth = Folder().run(small + "--only depth");
+    CHECK(frame.frame == both.frame && frame.depth.empty());
+    CHECK(depth.depth == both.depth && depth.frame.empty() && value(depth.out, "fragments") == 0);
+    CHECK_EQ(Folder().run(small + "--only depth --shadow exact").status, 2);
 }
 
 // A wall at z = 0 that faces viewer and light, a board before it that shadows a part of it, and a strip that turns its

@@ -55,5 +55,5 @@ umbra_mutant(mutant_no_caster_slope our_gl.cpp
   "max(receiver, caster)"
   "receiver")
 umbra_mutant(mutant_loose_fit main.cpp
-  "if (!classic) light = fitted(light, models, size)"
+  "if (!classic) light = fitted(light, casters, size)"
   "")

@@ -87,7 +87,8 @@ public:
         return *this / name;
     }
     Model load(const std::string& obj, NormalMap wanted = NormalMap::object) const {
-        const Model m(write("m.obj", obj), wanted);
+        Model m(write("m.obj", obj), wanted);
+        m.load_textures();
         check_invariants(m);
         return m;
     }
@@ -597,7 +598,10 @@ TEST("textures beside the model are found by their suffix, and may be absent; on
     fs::remove(folder / "m_nm_tangent.tga");
     CHECK_EQ(maps(folder.load(textured, NormalMap::tangent)), "10 20 -1 40 50; ");
     folder.picture("m.b_glow.tga", 60);
-    CHECK_EQ(maps(Model(folder.write("m.b.obj", textured))), "-1 -1 -1 -1 60; ");
+    Model dotted(folder.write("m.b.obj", textured));
+    CHECK_EQ(maps(dotted), "-1 -1 -1 -1 -1; ");
+    dotted.load_textures();
+    CHECK_EQ(maps(dotted), "-1 -1 -1 -1 60; ");
 }
 
 TEST("faces without texture coordinates have no textures; grey pictures are no normal maps") {

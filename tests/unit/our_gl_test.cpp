@@ -227,6 +227,28 @@ TEST("parallel_for calls each number once, and throws what a call throws") {
     }
 }
 
+// Of any size, from a speck to far beyond a double's precision on the screen, in front of the eye, beside and behind.
+TEST("what is not seen by its box covers no pixel, and what covers one is seen") {
+    Random r(21);
+    long unseen = 0, covering = 0;
+    for (int k = 0; k < 4000; k++) {
+        const double size = std::pow(10, r.in(-3, k % 9 ? 3 : 300));
+        const vec3 away = r.point(k % 2 ? size : 2);
+        std::vector<vec3> corners;
+        for (int i = 0; i < 3; i++) corners.push_back(r.point(size) + away);
+        const std::vector<Model> models{Model(corners, {}, {{0, 0, 1}}, {{0, -1, 0}, {1, -1, 0}, {2, -1, 0}})};
+        const vec3 eye = r.point(4);
+        const Camera camera{lookat(eye, {}, {0, 1, 0}), projection(-1 / norm(eye)), middle_viewport(20, 16)};
+        std::vector<vec4> clip;
+        for (const vec3& v : corners) clip.push_back(camera.to_clip() * point(v));
+        const Drawing d = drawing(ClipShader(clip), 20, 16, camera.Viewport);
+        const bool seen = !seen_by(camera, models, 20, 16).empty();
+        CHECK(seen || d.count.covered == 0);
+        unseen += !seen, covering += d.count.covered > 0;
+    }
+CHECK(unseen > 900 && covering > 900);
+}
+
 TEST("texels: nearest, wrapped, v upwards; grey is grey in all channels") {
     TGAImage map(4, 2, TGAImage::GRAYSCALE);
     for (int i = 0; i < 8; i++) *map.pixel(i % 4, i / 4) = static_cast<std::uint8_t>(i);
