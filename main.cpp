@@ -325,11 +325,14 @@ static void leave_out(const Options& opt, Scene& scene) {
 
 // Writes both pictures or, where one does not fit on the disk, none.
 static void write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
-    std::vector<TGAFile> files;
-    if (shadow.shadowbuffer.width() && opt.only != Options::Only::framebuffer)
-        files.emplace_back(depth_picture(shadow.shadowbuffer), opt.out / "depth.tga");
-    if (opt.only != Options::Only::depth) files.emplace_back(frame, opt.out / "framebuffer.tga");
-    for (TGAFile& file : files) file.commit();
+    std::optional<TGAFile> files[2];
+    parallel_for(2, [&](int i, int) {
+        if (i == 0 && shadow.shadowbuffer.width() && opt.only != Options::Only::framebuffer)
+            files[i].emplace(depth_picture(shadow.shadowbuffer), opt.out / "depth.tga");
+        if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, opt.out / "framebuffer.tga");
+    });
+    for (auto& file : files)
+        if (file) file->commit();
 }
 
 static double milliseconds() {

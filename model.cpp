@@ -17,9 +17,6 @@
 #include <set>
 #include <string_view>
 #include <thread>
-#if __has_include(<sys/mman.h>)
-#include <sys/mman.h>
-#endif
 
 namespace fs = std::filesystem;
 
@@ -27,9 +24,8 @@ namespace {
 
 using Corner = Model::Corner;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-// A vertex takes 8 bytes of text, a face's corner 2: no array made from so much text has 2^31 elements.
-constexpr std::uintmax_t max_bytes = std::uintmax_t{1} << 32;
 
+// A vertex takes 8 bytes of text, a face's corner 2: no array made from a file of 4 GiB has 2^31 elements.
 int count(const auto& array) { return static_cast<int>(array.size()); }
 
 // ---- text, line by line and word by word ----
@@ -64,39 +60,11 @@ void join_lines(char* begin, char* end) {
     }
 }
 
-struct Text {  // the bytes [begin,end), there as long as OWNER
-    std::shared_ptr<void> owner;
-    char *begin = nullptr, *end = nullptr;
-};
-
 // A whole text file, its lines joined and each ended by '\n', the last one too.
-Text read_text(const fs::path& path) {
-    const auto fail = [&](const std::string& what) { throw std::runtime_error(path.string() + ": " + what); };
-    std::error_code unknown;
-    if (fs::is_directory(path, unknown)) fail("is a directory");
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.string().c_str(), "rb"), std::fclose);
-    if (!file) fail("cannot be opened: " + std::generic_category().message(errno));
-    Text text;
-#ifdef MAP_PRIVATE
-    // A mapping costs neither a copy nor fresh memory: a quarter of the loading time. What is written stays in here.
-    const std::uintmax_t size = fs::file_size(path, unknown);
-    void* const map = unknown || size > max_bytes
-                          ? MAP_FAILED
-                          : mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE, fileno(file.get()), 0);
-    char* const first = static_cast<char*>(map);
-    if (map != MAP_FAILED) text = {{map, [size](void* p) { munmap(p, size); }}, first, first + size};
-#endif
-    if (!text.owner || text.end[-1] != '\n') {
-        const auto bytes = std::make_shared<std::string>();
-        char piece[1 << 14];
-        while (const std::size_t n = std::fread(piece, 1, sizeof piece, file.get())) {
-            if (bytes->append(piece, n).size() > max_bytes) fail("is larger than 4 GiB");
-        }
-        if (std::ferror(file.get())) fail("cannot be read");
-        *bytes += '\n';
-        text = {bytes, bytes->data(), bytes->data() + bytes->size()};
-    }
-    if (find('\0', text.begin, text.end)) fail("is a binary file, not text");
+FileBytes read_text(const fs::path& path) {
+    FileBytes text = read_file(path, 1);
+    if (text.begin == text.end || text.end[-1] != '\n') *text.end++ = '\n';
+    if (find('\0', text.begin, text.end)) throw std::runtime_error(path.string() + ": is a binary file, not text");
     if (std::string_view(text.begin, text.end).starts_with("\xEF\xBB\xBF")) text.begin += 3;  // UTF-8's byte order mark
     join_lines(text.begin, text.end);
     return text;
@@ -226,7 +194,7 @@ public:
     int nfaces() const { return static_cast<int>(corners.size() / 3); }
     Corner* corners_of(int face) { return corners.data() + 3 * std::ptrdiff_t{face}; }
 
-    Obj(const fs::path& path, const Text& text) : Scanner(path, text.begin, text.end) {
+    Obj(const fs::path& path, const FileBytes& text) : Scanner(path, text.begin, text.end) {
         // About what a mesh of many faces comes to: to grow costs a copy and fresh memory, a fifth of the loading time.
         const std::ptrdiff_t bytes = text.end - text.begin;
         verts.reserve(bytes / 96), uvs.reserve(bytes / 96), normals.reserve(bytes / 96), corners.reserve(bytes / 32);
@@ -534,7 +502,7 @@ void read_mtl(const fs::path& path, Library& library) {
     static const std::map<std::string_view, int> maps = {
         {"map_Kd", diffuse_map}, {"map_Ks", specular_map}, {"map_Ke", glow_map}, {"norm", tangent_map},
         {"map_Bump", bump_map},  {"map_bump", bump_map},   {"bump", bump_map}};
-    const Text text = read_text(path);
+    const FileBytes text = read_text(path);
     Scanner in(path, text.begin, text.end), in_folder(path.filename(), text.begin, text.end);
     MtlMaterial before_the_first, *material = &before_the_first;
     const auto note = [&](const std::string& what) {

@@ -179,11 +179,12 @@ public:
 
 private:
     void share(int me) {
+        int i = 0;
         try {
-            for (int i; (i = next_++) < n_;) (*work_)(i, me);
+            while ((i = next_++) < n_) (*work_)(i, me);
         } catch (...) {
             const std::lock_guard lock(mutex_);
-            error_ = std::current_exception();
+            if (!error_ || i < failed_) error_ = std::current_exception(), failed_ = i;
         }
     }
     void work_in_rounds(int me) {
@@ -211,7 +212,7 @@ private:
     }
 
     const std::function<void(int, int)>* work_ = nullptr;
-    int n_ = 0;
+    int n_ = 0, failed_ = 0;
     std::atomic<int> next_ = 0, working_ = 0, round_ = 0;
     std::mutex mutex_;
     std::condition_variable changed_;

@@ -207,8 +207,8 @@ void use_threads(int n);
 int thread_count();
 
 // Calls work(i, thread) once for each i in [0,n), on as many threads as can be had, with a thread number below
-// thread_count(). In what order is not defined. What one of the calls throws is thrown here, once all have ended. Not
-// to be called by two threads at once, nor by work itself.
+// thread_count(). In what order is not defined. What the call with the lowest i throws is thrown here, once all have
+// ended. Not to be called by two threads at once, nor by work itself.
 void parallel_for(int n, const std::function<void(int i, int thread)>& work);
 
 // A pass: draws the faces of all shaders. Into a z-buffer go the depths of what is nearest, whatever it held before

@@ -5,8 +5,19 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <utility>
 #include <vector>
+
+// A file as a whole: the bytes [begin,end), there as long as OWNER is.
+struct FileBytes {
+    std::shared_ptr<void> owner;
+    char *begin = nullptr, *end = nullptr;
+};
+
+// Its bytes and those BEYOND its end may be written to, which stays in memory. Where the system can, the file is mapped,
+// and must not become shorter while it is used. Throws std::runtime_error "FILE: what", also for 4 GiB or more.
+FileBytes read_file(const std::filesystem::path& path, std::size_t beyond);
 
 struct TGAColor {
     std::uint8_t bgra[4] = {0, 0, 0, 0};

@@ -68,7 +68,7 @@ TEST("a picture passes where it is its reference, and else it is said why not") 
         CHECK_EQ(not_reference(picture, "name", in_readme, {folder / "new", folder / "failed", true}), "");
         fs::remove_all(folder / "failed");
     };
-    check(reference, false, "no reference: " + file.string() + ": cannot open: ");
+    check(reference, false, "no reference: " + file.string() + ": cannot be opened: ");
     CHECK(!fs::exists(file) && !fs::exists(differing));  // none was made
 
     update(reference, false);
@@ -110,7 +110,7 @@ TEST("the command says how pictures differ, and its status whether") {
     CHECK(compare(TGAImage::read_tga_file(folder / "diff.tga"), difference_picture(reference, wrong)).same());
     check("a.tga d.tga size.tga", 1, "the sizes differ\n");
     CHECK(!fs::exists(folder / "size.tga"));
-    check("a.tga none.tga", 2, "compare_pictures: none.tga: cannot open: ");
+    check("a.tga none.tga", 2, "compare_pictures: none.tga: cannot be opened: ");
     check("a.tga", 2, "usage: compare_pictures A.tga B.tga [DIFF.tga]\n");
 }
 
