@@ -15,7 +15,7 @@ struct FileBytes {
     char *begin = nullptr, *end = nullptr;
 };
 
-// Its bytes and those BEYOND its end may be written to, which stays in memory. Where the system can, the file is mapped,
+// Its bytes and those BEYOND its end may be written to, which stays in memory. Where the system can, the file is mapped
 // and must not become shorter while it is used. Throws std::runtime_error "FILE: what", also for 4 GiB or more.
 FileBytes read_file(const std::filesystem::path& path, std::size_t beyond);
 
@@ -36,8 +36,8 @@ public:
     // Reads types 1, 2, 3, 9, 10, 11 at 8, 15, 16, 24 and 32 bits, all four origins, with or without image ID, colour
     // map and 2.0 footer. A colour-mapped picture comes out in the format of its map; 15 and 16 bits become RGB (RGBA
     // where the header declares an attribute bit), five bits scaled to eight. Throws std::runtime_error "FILE: what" or
-    // "FILE: byte N: what". Allocates at most 257 times the size of the file, which is held whole, and 4 KiB: 256 times
-    // is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map).
+    // "FILE: byte N: what". Allocates at most 257 times the size of the file, which may be held whole, and 4 KiB: 256
+    // times is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map).
     static TGAImage read_tga_file(const std::filesystem::path& path);
 
     // Writes the picture to PATH: TGAFile(*this, path, rle).commit(), see below.
