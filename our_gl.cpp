@@ -348,7 +348,7 @@ struct Point {
     double z;
 };
 
-Point snapped(const vec4& s, int width, int height) {
+INLINED Point snapped(const vec4& s, int width, int height) {
     constexpr double one = 1 << subpixel_bits;
     const vec3 p = project(s);
     // On a guard plane rounding may land a hair outside: that is no more than 2^-10 of a sub-pixel.
@@ -383,7 +383,7 @@ struct Coverage {
 };
 
 // The box and the range of depths of a polygon; false where it covers no pixel's centre.
-bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
+INLINED bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
     constexpr std::int32_t half = 1 << (subpixel_bits - 1);
     Point low = corners[0], high = low;
     for (int i = 1; i < n; i++) {
