@@ -378,9 +378,12 @@ int clip(const Screen& s, int width, int height, Point (&corners)[most_corners])
 // The pixels whose centres lie in the box of a face, and its depth, which is linear on the screen.
 struct Coverage {
     int xmin, xmax, ymin, ymax;
+    bool is_small;  // the box is at most small_box pixels wide and high
     double zx, zy, z0;   // depth = zx (x - xmin) + zy (y - ymin) + z0 at the centre of the pixel (x,y) ...
     double zmin, zmax;   // ... and no smaller or larger than those of its corners
 };
+
+constexpr int small_box = 60;
 
 // The box and the range of depths of a polygon; false where it covers no pixel's centre.
 INLINED bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
@@ -394,6 +397,7 @@ INLINED bool bound(const Point* corners, int n, int width, int height, Coverage&
     // A depth beyond the range of a float is drawn as its largest one, not as infinity.
     constexpr double most = std::numeric_limits<float>::max();
     c.zmin = std::clamp(low.z, -most, most), c.zmax = std::clamp(high.z, -most, most);
+    c.is_small = std::max(high.x - low.x, high.y - low.y) <= small_box << subpixel_bits;
     // Pixel x has its centre at x + half: the first at or right of low, the last at or left of high.
     c.xmin = std::max(0, (low.x + half - 1) >> subpixel_bits);
     c.ymin = std::max(0, (low.y + half - 1) >> subpixel_bits);
@@ -464,9 +468,12 @@ struct Edge {
 
 // Calls visit(x0, y, inside) for the pixels of a triangle on the rows [y_begin, y_end): x0 is a multiple of lanes,
 // inside says which of the pixels from there on. The edges' first pixel is (c.xmin / lanes * lanes, y_begin). Returns
-// how many pixels are inside. This one asks at every pixel of the box, and takes less time for small ones.
+// in each lane how many pixels are inside. This one asks at every pixel of the box, and takes less time for small ones:
+// corners differ by at most 60 pixels, and a pixel beside the box by at most 7 more, so that what is left of two
+// products without the bits that are cut off is below 2 * 60 * 67 * 2^16 < 2^29.
 template <class Visit>
-INLINED long for_each_in_box(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end, Visit&& visit) {
+INLINED pack<std::int32_t> for_each_in_box(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end,
+                                           Visit&& visit) {
     using Lanes = pack<std::int32_t>;
     Lanes row[3], right[3], up[3], inside_in_all = 0;
     for (int i = 0; i < 3; i++) {
@@ -484,15 +491,14 @@ INLINED long for_each_in_box(const Coverage& c, const Edge (&edges)[3], int y_be
         }
         for (int i = 0; i < 3; i++) row[i] = row[i] + up[i];
     }
-    long sum = 0;
-    for (int i = 0; i < lanes; i++) sum += inside_in_all[i];
-    return sum;
+    return inside_in_all;
 }
 
 // The same for a triangle of any size. How often the step along a row goes into an edge function is where that changes
 // its sign; from row to row it grows by a quotient and a remainder, as in Bresenham's lines.
 template <class Visit>
-INLINED long for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end, Visit&& visit) {
+INLINED pack<std::int32_t> for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end,
+                                             Visit&& visit) {
     struct Crossing {
         std::int64_t divisor, times, rest, more_times, more_rest;
     } crossings[3];
@@ -507,7 +513,7 @@ INLINED long for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_
         divide(edges[i].up, e.more_times, e.more_rest);
     }
     const int x_first = c.xmin / lanes * lanes;
-    long sum = 0;
+    pack<std::int32_t> inside_in_all = 0;
     for (int y = y_begin; y < y_end; y++) {
         std::int64_t begin = 0, end = c.xmax + 1 - x_first;
         for (int i = 0; i < 3; i++) {
@@ -519,11 +525,13 @@ INLINED long for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_
             if (e.rest >= e.divisor) e.times++, e.rest -= e.divisor;
         }
         if (begin >= end) continue;
-        sum += static_cast<long>(end - begin);
-        for (auto x = static_cast<int>(begin) / lanes * lanes; x < end; x += lanes)
-            visit(x_first + x, y, (lane_numbers > begin - x - 1) & (lane_numbers < end - x));
+        for (auto x = static_cast<int>(begin) / lanes * lanes; x < end; x += lanes) {
+            const mask inside = (lane_numbers > begin - x - 1) & (lane_numbers < end - x);
+            visit(x_first + x, y, inside);
+            inside_in_all = inside_in_all + select(inside, pack<std::int32_t>(1), 0);
+        }
     }
-    return sum;
+    return inside_in_all;
 }
 
 // ---- drawing ----
@@ -647,6 +655,7 @@ struct Pass {
         float* depth = zbuffer ? zbuffer->row(y_begin) : (w.depth.resize(cells), w.depth.data());
         std::fill_n(depth, cells, DepthBuffer::nothing);
         if (picture) w.nearest.assign(cells, -1), w.faces.clear();
+        pack<std::int32_t> covered = 0;
         for (const Block& b : blocks)
             for (const int number : b.touching[strip]) {
                 const int s = model_of(number, first_face);
@@ -656,20 +665,24 @@ struct Pass {
                 const int n = corners_of(face, screen, corners);
                 bound(corners, n, width, height, face);
                 planes(screen, face);
-                for (int k = 2; k < n; k++)  // what has been cut is a fan of triangles
-                    w.count.covered += triangle(face, corners[0], corners[k - 1], corners[k], y_begin, y_end, depth, w);
+                for (int k = 2; k < n; k++) {  // what has been cut is a fan of triangles
+                    const Point* const abc[] = {&corners[0], &corners[k - 1], &corners[k]};
+                    covered = covered + triangle(face, abc, y_begin, y_end, depth, w);
+                }
                 if (picture) w.faces.push_back(face);
             }
+        for (int i = 0; i < lanes; i++) w.count.covered += covered[i];
         if (!picture) return;
         std::memset(picture->pixel(0, y_begin), 0, std::size_t{1} * picture->bytespp() * width * (y_end - y_begin));
         for (int mark = 0; mark < static_cast<int>(w.faces.size()); mark++)
             w.count.shaded += shade(mark, thread, y_begin, y_end);
     }
 
-    // Draws a triangle of a face into the rows of a strip. Returns the number of samples.
-    long triangle(const Face& face, const Point& a, const Point& b, const Point& c, int y_begin, int y_end,
-                  float* depth, Workspace& w) const {
+    // Draws a triangle of a face into the rows of a strip. Returns the number of samples in each lane.
+    pack<std::int32_t> triangle(const Face& face, const Point* const (&abc)[3], int y_begin, int y_end, float* depth,
+                                Workspace& w) const {
         using wide = std::int64_t;
+        const Point &a = *abc[0], &b = *abc[1], &c = *abc[2];
         constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
         const wide area = (wide{b.x} - a.x) * (wide{c.y} - a.y) - (wide{b.y} - a.y) * (wide{c.x} - a.x);
         if (area == 0) return 0;
@@ -677,13 +690,11 @@ struct Pass {
         const int y_first = std::max(y_begin, face.ymin), y_last = std::min(y_end, face.ymax + 1) - 1;
         const wide first_x = face.xmin / lanes * lanes * one + half, first_y = y_first * one + half;
         Edge edges[3];
-        wide farthest = 0;  // of a corner from the first pixel, along x or y
         for (int i = 0; i < 3; i++) {
             const Point &p = *corner[i], &q = *corner[i + 1];
             const wide dx = wide{q.x} - p.x, dy = wide{q.y} - p.y;
             const bool top_left = dy < 0 || (dy == 0 && dx < 0);
             edges[i] = {(dx * (first_y - p.y) - dy * (first_x - p.x) - !top_left) >> subpixel_bits, -dy, dx};
-            farthest = std::max({farthest, std::abs(p.x - first_x), std::abs(p.y - first_y)});
         }
 
         const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
@@ -698,9 +709,7 @@ struct Pass {
             select(nearer, z, old).store(depth + at);
             if (nearest) select(nearer, mark, pack<std::int32_t>::load(nearest + at)).store(nearest + at);
         };
-        // Then dx and dy are below 120 pixels and no corner is more than 124 from a pixel of the box: two products,
-        // without the bits that are cut off, add up to less than 2 * 120 * 124 * 2^16 < 2^31.
-        if (farthest < 60 * one && face.xmax - face.xmin < 4 * lanes)
+        if (face.is_small && face.xmax - face.xmin < 4 * lanes)
             return for_each_in_box(face, edges, y_first, y_last + 1, visit);
         return for_each_in_spans(face, edges, y_first, y_last + 1, visit);
     }
