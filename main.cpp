@@ -41,11 +41,11 @@ struct DepthShader final : IShader {  // only the z-buffer is wanted: there is n
     }
 };
 
-struct Shadow {                    // what the first pass leaves for the second
-    Options::Method method = Options::Method::off;  // off where nothing can throw a shadow onto what is seen
-    mat4 M = mat4::identity();     // Viewport*Projection*ModelView of the light: from object space to its screen
-    DepthBuffer shadowbuffer;      // what is nearest to the light there ...
-    LightGrid grid;                // ... or, for exact shadows, all faces
+struct Shadow {  // what the first pass leaves for the second
+    Options::Method method = Options::Method::off;  // off, too, where nothing can throw a shadow onto what is seen
+    mat4 M = mat4::identity();  // Viewport*Projection*ModelView of the light: from object space to its screen
+    DepthBuffer shadowbuffer;   // what is nearest to the light there ...
+    LightGrid grid;             // ... or, for exact shadows, all faces
 };
 
 // ---- pass 2: what the viewer sees ----

@@ -72,9 +72,9 @@ struct Bench {
             const double map = passes(" --frames " + n), exact = passes(" --shadow exact --frames " + n);
             row.map.push_back(map), row.exact.push_back(exact), row.exact_to_map.push_back(exact / map);
             // An opponent that cannot read the model has no figure.
-            if (const std::string line = said(rasterize); !rasterizer.empty() && !line.empty())
+            if (const std::string line = rasterizer.empty() ? "" : said(rasterize); !line.empty())
                 row.map_to_rasterizer.push_back(map / value(line, "frame_finish"));
-            if (const std::string line = said(cast_rays); !raycaster.empty() && !line.empty())
+            if (const std::string line = raycaster.empty() ? "" : said(cast_rays); !line.empty())
                 row.exact_to_raycaster.push_back(exact / value(line, "sum"));
         }
         return row;
