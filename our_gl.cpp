@@ -786,7 +786,7 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBu
     return Pass{shader, nshaders, Viewport, zbuffer.width(), zbuffer.height(), &zbuffer, nullptr}.draw();
 }
 Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImage& picture) {
-    assert(picture.bytespp() >= 3);
+    assert(picture.bytespp() >= 3 && std::max(picture.width(), picture.height()) <= max_size);
     return Pass{shader, nshaders, Viewport, picture.width(), picture.height(), nullptr, &picture}.draw();
 }
 
@@ -919,7 +919,8 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cel
         }
     });
     parallel_for(static_cast<int>(bands_.size()), [&](int b, int) {
-        auto& [first, entries] = bands_[b];
+        std::vector<std::uint32_t>& first = bands_[b].first;
+        std::vector<Entry>& entries = bands_[b].entries;
         const auto for_each_entry = [&](auto&& visit) {
             for (const auto& faces_of_band : touching)
                 for (const int face : faces_of_band[b])

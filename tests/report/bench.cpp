@@ -22,14 +22,14 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 // For the table: nothing where nothing was measured.
-std::string ratio(const std::vector<double>& values) {
+std::string column(const std::vector<double>& values) {
     char text[20] = "";
     if (!values.empty()) std::snprintf(text, sizeof text, "%.2f", median(values));
     return text;
 }
 
 std::string quotient(double a, double b, bool wanted) {
-    return ratio(wanted ? std::vector{a / b} : std::vector<double>());
+    return column(wanted ? std::vector{a / b} : std::vector<double>());
 }
 
 struct Case {
@@ -92,28 +92,34 @@ int main(int argc, char** argv) try {
         if (arg == "--rounds") bench.rounds = std::max(1, std::atoi(argv[++i]));
         else if (arg == "--rasterizer") bench.rasterizer = quoted(next), i++;
         else if (arg == "--raycaster") bench.raycaster = quoted(next), i++;
-        else if (arg == "-o") csv = std::fopen((next + "/bench.csv").c_str(), "w"), i++;
+        else if (arg == "-o") {
+            csv = std::fopen((next + "/bench.csv").c_str(), "w"), i++;
+            if (!csv) throw std::runtime_error(next + "/bench.csv: cannot be written");
+        }
         else models.push_back(std::filesystem::absolute(arg).string());
     }
     if (models.empty()) models = {UMBRA_OBJ_DIR "/idol/idol.obj", UMBRA_OBJ_DIR "/knot/knot.obj"};
-    const auto print = [&](const char* format, auto... values) {
-        std::printf(format, values...);
-        if (csv) std::fprintf(csv, format, values...);
+    const auto print = [&](const std::string& line) {
+        std::puts(line.c_str());
         std::fflush(stdout);
+        if (csv) std::fputs((line + '\n').c_str(), csv);
     };
     print("triangles,size,threads,map_ms,exact_ms,exact_to_map,map_to_rasterizer,exact_to_raycaster,"
-          "to_one_thread,to_half_the_side\n");
+          "to_one_thread,to_half_the_side");
     for (const std::string& model : models) {
         std::map<std::pair<int, int>, double> map_ms;  // by size and threads
         for (const int size : {800, 1600, 3200})
             for (const int threads : {1, 2}) {
                 const Row row = bench.measured({model, size, threads});
                 const double map = map_ms[{size, threads}] = median(row.map);
-                print("%.0f,%d,%d,%.2f,%.2f,%s,%s,%s,%s,%s\n", row.triangles, size, threads, map, median(row.exact),
-                      ratio(row.exact_to_map).c_str(), ratio(row.map_to_rasterizer).c_str(),
-                      ratio(row.exact_to_raycaster).c_str(),
-                      quotient(map, map_ms[{size, 1}], threads > 1).c_str(),
-                      quotient(map, map_ms[{size / 2, threads}], size > 800).c_str());
+                std::string line = std::to_string(std::lround(row.triangles)) + ',' + std::to_string(size) + ',' +
+                                   std::to_string(threads);
+                for (const std::string& figure :
+                     {column(row.map), column(row.exact), column(row.exact_to_map), column(row.map_to_rasterizer),
+                      column(row.exact_to_raycaster), quotient(map, map_ms[{size, 1}], threads > 1),
+                      quotient(map, map_ms[{size / 2, threads}], size > 800)})
+                    line += ',' + figure;
+                print(line);
             }
     }
     if (csv && std::fclose(csv)) throw std::runtime_error("bench.csv: cannot be written");
