@@ -81,7 +81,7 @@ struct PhongShader final : IShader {
         const vec3& v = model.vert(iface, nthvert);
         material = &model.material(iface);
         varying_uv[nthvert] = model.uv(iface, nthvert);
-        varying_sb[nthvert] = project(shadow.M * point(v));
+        if (shadow.method != Options::Method::off) varying_sb[nthvert] = project(shadow.M * point(v));
         if (!material->normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
         if (material->tangent) varying_eye[nthvert] = (uniform_M * point(v)).xyz();

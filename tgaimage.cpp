@@ -49,7 +49,7 @@ FileBytes read_file(const fs::path& path, std::size_t beyond) {
     if (!unknown && size < most && rest > 0 && rest + beyond <= page) {
         void* const map = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE, fileno(file.get()), 0);
         char* const first = static_cast<char*>(map);
-        if (map != MAP_FAILED) return {{map, [size](void* p) { munmap(p, size); }}, first, first + size};
+        if (map != MAP_FAILED) return {{map, [size](void* p) { munmap(p, size); }}, first, first + size, true};
     }
 #endif
     const auto bytes = std::make_shared<std::string>();
@@ -59,6 +59,13 @@ FileBytes read_file(const fs::path& path, std::size_t beyond) {
     if (std::ferror(file.get())) fail("cannot be read: " + reason());
     bytes->resize(bytes->size() + beyond);
     return {bytes, bytes->data(), bytes->data() + bytes->size() - beyond};
+}
+
+void FileBytes::forget_before([[maybe_unused]] const char* place) const {
+#ifdef MAP_PRIVATE
+    const std::size_t page = sysconf(_SC_PAGESIZE), start = reinterpret_cast<std::size_t>(owner.get());
+    if (is_mapped) madvise(owner.get(), (reinterpret_cast<std::size_t>(place) - start) / page * page, MADV_DONTNEED);
+#endif
 }
 
 namespace {

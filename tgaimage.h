@@ -13,6 +13,11 @@
 struct FileBytes {
     std::shared_ptr<void> owner;
     char *begin = nullptr, *end = nullptr;
+    bool is_mapped = false;
+
+    // What lies before PLACE is not needed any more, and what has been written there may be lost: a mapped file then
+    // takes no memory for it.
+    void forget_before(const char* place) const;
 };
 
 // Its bytes and those BEYOND its end may be written to, which stays in memory. Where the system can, the file is mapped
