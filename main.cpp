@@ -332,6 +332,8 @@ static void write(const Options& opt, const Shadow& shadow, const TGAImage& fram
         if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, opt.out / "framebuffer.tga");
     });
     for (auto& file : files)
+        if (file) file->write();
+    for (auto& file : files)
         if (file) file->commit();
 }
 

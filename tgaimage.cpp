@@ -295,15 +295,14 @@ Byte* encode_row(const Byte* row, int width, Byte* dst) {
 
 }  // namespace
 
-void TGAImage::write_tga_file(const fs::path& path, bool rle) const { TGAFile(*this, path, rle).commit(); }
+void TGAImage::write_tga_file(const fs::path& path, bool rle) const {
+    TGAFile file(*this, path, rle);
+    file.write();
+    file.commit();
+}
 
-TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(path), temporary_{} {
+TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(path) {
     if (image.empty()) throw std::invalid_argument(path.string() + ": a picture of 0 x 0 pixels cannot be written");
-    std::error_code error;
-    const fs::file_status status = fs::status(path, error);
-    // Renaming would put the picture in the place of a device.
-    if (fs::exists(status) && !fs::is_regular_file(status)) fail(path, "it is not a regular file");
-
     const int w = image.width(), h = image.height(), bpp = image.bytespp();
     const int type = (bpp == TGAImage::GRAYSCALE ? 3 : 2) | (rle ? rle_bit : 0);
     const int descriptor = top_bit | (bpp == TGAImage::RGBA ? 8 : 0);  // eight bits of alpha
@@ -315,21 +314,27 @@ TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(
     // A run saves at least the header of the raw packet before it, so that a row takes at most its own bytes and a
     // header for each 128 pixels.
     const std::size_t most_of_row = w * bpp + (w + longest_packet - 1) / longest_packet;
-    const auto file = std::make_unique_for_overwrite<Byte[]>(sizeof header + h * most_of_row + sizeof footer);
+    bytes_ = std::make_unique_for_overwrite<Byte[]>(sizeof header + h * most_of_row + sizeof footer);
     constexpr decltype(&encode_row<1>) encoders[] = {nullptr, encode_row<1>, nullptr, encode_row<3>, encode_row<4>};
-    Byte* end = std::copy_n(header, sizeof header, file.get());
+    Byte* end = std::copy_n(header, sizeof header, bytes_.get());
     for (int y = h - 1; y >= 0; y--)
         end = rle ? encoders[bpp](image.pixel(0, y), w, end) : std::copy_n(image.pixel(0, y), w * bpp, end);
-    end = std::copy_n(footer, sizeof footer, end);
+    size_ = std::copy_n(footer, sizeof footer, end) - bytes_.get();
+}
 
-    fs::path temporary = path;
+void TGAFile::write() {
+    std::error_code error;
+    const fs::file_status status = fs::status(path_, error);
+    // Renaming would put the picture in the place of a device.
+    if (fs::exists(status) && !fs::is_regular_file(status)) fail(path_, "it is not a regular file");
+    fs::path temporary = path_;
     temporary += ".part";
     Stream stream = open(temporary, "wb");
-    if (!stream) fail(path, reason());
+    if (!stream) fail(path_, reason());
     temporary_.path = temporary;
     errno = 0;
-    if (std::fwrite(file.get(), end - file.get(), 1, stream.get()) != 1) fail(path, reason());
-    if (std::fclose(stream.release())) fail(path, reason());  // flushes what is left
+    if (std::fwrite(bytes_.get(), size_, 1, stream.get()) != 1) fail(path_, reason());
+    if (std::fclose(stream.release())) fail(path_, reason());  // flushes what is left
 }
 
 void TGAFile::commit() {

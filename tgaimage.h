@@ -45,7 +45,7 @@ public:
     // times is what RLE can ask for (a packet of 2 bytes gives 128 pixels of 4 bytes through a colour map).
     static TGAImage read_tga_file(const std::filesystem::path& path);
 
-    // Writes the picture to PATH: TGAFile(*this, path, rle).commit(), see below.
+    // Makes it a file at PATH, see TGAFile.
     void write_tga_file(const std::filesystem::path& path, bool rle = true) const;
 
     int width() const { return w_; }
@@ -78,15 +78,15 @@ private:
     std::vector<std::uint8_t> data_;  // rows from the bottom up, and 3 bytes more: four can be read at every pixel
 };
 
-// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. All its bytes go to
-// a temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of
-// one. Without commit() the temporary file goes with the object. Of several pictures, commit the first when all of them
-// are constructed: where one does not fit on the disk, none is replaced. The file is made in memory: the bytes of the
-// picture at most, one more for each 128 pixels of a row, and 44. Throws std::runtime_error "FILE: what", with the
-// temporary file removed.
+// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. It is made in memory
+// of the picture's bytes at most, one more for each 128 pixels of a row, and 44. write() puts all of them into a
+// temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of
+// one. Without commit() the temporary file goes with the object. Of several pictures, commit the first when all are
+// written: where one does not fit on the disk, none is replaced. Throws std::runtime_error "FILE: what".
 class TGAFile {
 public:
     TGAFile(const TGAImage& image, const std::filesystem::path& path, bool rle = true);
+    void write();
     void commit();
 
 private:
@@ -97,5 +97,7 @@ private:
         ~Temporary();
     };
     std::filesystem::path path_;
+    std::unique_ptr<std::uint8_t[]> bytes_;
+    std::size_t size_;
     Temporary temporary_;
 };
