@@ -67,7 +67,8 @@ Camera fitted(const Camera& camera, const Models& models, int size) {
 
 namespace {
 
-// A corner of a model's box, transformed, and what rounding may have done to each coordinate.
+// A corner of a model's box, transformed, and what rounding may have done to each coordinate: to the products that make
+// up M and to four more with their sums, some 20 half-units of 2^-53 of their sizes; 2^-48 is 32.
 struct Corner {
     vec4 at, off;
 };
@@ -643,8 +644,10 @@ struct Pass {
         const int n = corners_of(face, screen, corners);
         block.count.triangles++;
         if (n == 0) block.count.outside++;
-        else if (!bound(corners, n, width, height, c)) block.count.between_samples++;
-        else for (int s = c.ymin / strip_rows; s <= c.ymax / strip_rows; s++)
+        else if (!bound(corners, n, width, height, c)) {
+            const bool beside = c.xmin >= width || c.ymin >= height || c.xmax < 0 || c.ymax < 0;
+            (beside ? block.count.outside : block.count.between_samples)++;
+        } else for (int s = c.ymin / strip_rows; s <= c.ymax / strip_rows; s++)
             block.touching[s].push_back(first_face[face.shader] + face.iface);
     }
 

@@ -194,7 +194,7 @@ INLINED real power(real base, const real& exponent) {
 // What a pass did, and what it left out. The same at any number of threads.
 struct Counters {
     long triangles = 0;        // faces handed in
-    long outside = 0;          // ... of which wholly outside of the picture
+    long outside = 0;          // ... of which beyond all pixels' centres on one side, or behind the eye
     long between_samples = 0;  // ... of which between the pixels' centres
     long covered = 0;          // samples inside of a face: depth tests
     long shaded = 0;           // pixels that fragment() coloured: each visible one once

@@ -227,6 +227,22 @@ TEST("parallel_for calls each number once, and throws what a call throws") {
     }
 }
 
+// A picture of 20 x 16 pixels, in pixels: the guard band around it is 4096 wide.
+TEST("faces beside the picture are counted as outside, those between centres as that") {
+    constexpr struct { double x, y; long outside, between; } cases[] = {
+        {-9, 5, 1, 0}, {25, 5, 1, 0}, {5, -9, 1, 0}, {5, 25, 1, 0}, {-9000, 5, 1, 0}, {5, 9000, 1, 0},
+        {5.6, 5.6, 0, 1}, {19.1, 15.1, 0, 1}, {5.4, 5.4, 0, 0}};
+    for (const auto& [x, y, outside, between] : cases) {
+        std::vector<vec4> clip;
+        for (const auto& [dx, dy] : {std::pair(0., 0.), std::pair(.3, 0.), std::pair(0., .3)})
+            clip.push_back({(x + dx) / 10 - 1, (y + dy) / 8 - 1, 0, 1});
+        const Counters c = drawing(clip, 20, 16).count;
+        CHECK_EQ(c.outside, outside);
+        CHECK_EQ(c.between_samples, between);
+        CHECK_EQ(c.covered, 1 - outside - between);
+    }
+}
+
 // Of any size, from a speck to far beyond a double's precision on the screen, in front of the eye, beside and behind.
 TEST("what is not seen by its box covers no pixel, and what covers one is seen") {
     Random r(21);
