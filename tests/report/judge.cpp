@@ -25,7 +25,7 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
     for (const char* option : {"-o", "--size", "--shadow-size", "--eye", "--center", "--up", "--light", "--shadow",
-                               "--bias", "--draw", "--threads"})
+                               "--bias", "--draw", "--only", "--threads", "--frames"})
         values[option];
     bool fit = true;
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
