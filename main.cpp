@@ -24,7 +24,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     std::vector<std::filesystem::path> models;
     std::filesystem::path out = ".";
     enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
-    bool tangent = false, fit = true, quiet = false, help = false, version = false;
+    bool own_light = false, tangent = false, fit = true, quiet = false, help = false, version = false;
     int threads = thread_count(), frames = 1;
 };
 
@@ -232,8 +232,8 @@ static const Option options[] = {
     {"--eye", "X,Y,Z", "the viewer (1,1,4)", [](Options& o, const Value& v) { v.read(o.eye); }},
     {"--center", "X,Y,Z", "what the viewer looks at (0,0,0)", [](Options& o, const Value& v) { v.read(o.center); }},
     {"--up", "X,Y,Z", "what appears upwards (0,1,0)", [](Options& o, const Value& v) { v.read(o.up); }},
-    {"--light", "X,Y,Z", "direction towards the light (1,1,0)",
-     [](Options& o, const Value& v) { v.read(o.light_dir); }},
+    {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
+     [](Options& o, const Value& v) { v.read(o.light_dir), o.own_light = true; }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
      [](Options& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
@@ -244,7 +244,7 @@ static const Option options[] = {
      [](Options& o, const Value& v) { o.only = Options::Only(v.one_of({"both", "framebuffer", "depth"})); }},
     {"--tangent", "", "prefer a tangent-space normal map to an object-space one",
      [](Options& o, const Value&) { o.tangent = true; }},
-    {"--no-fit", "", "keep a model's own coordinates (default: fit what is beyond [-1,1]^3 or too small to see)",
+    {"--no-fit", "", "keep the scene's own coordinates (default: fit it where it is cut off, off the centre or small)",
      [](Options& o, const Value&) { o.fit = false; }},
     {"--threads", "N", "the pictures are the same at any number (all processors)",
      [](Options& o, const Value& v) { v.read(o.threads, 256); }},
@@ -301,11 +301,8 @@ struct Scene {
 
 static Scene load(const Options& opt) {
     Scene scene;
-    for (const auto& path : opt.models) {
-        Model& model = scene.models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
-        if (opt.fit) model.fit();
-        model.move(-opt.center);
-    }
+    for (const auto& path : opt.models)
+        scene.models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
     return scene;
 }
 
@@ -349,6 +346,12 @@ static double median(std::vector<double>& values) {
 static void run(Options opt) {
     const double start = milliseconds();
     Scene scene = load(opt);
+    if (opt.fit && fit(scene.models)) {
+        if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the lesson's leaves dark what faces the viewer
+        if (!opt.quiet) complain(opt.own_light ? "the scene is fitted to the picture (--no-fit)" :
+                                 "the scene is fitted to the picture and lit from 1,1,1 (--no-fit, --light X,Y,Z)", 0);
+    }
+    for (Model& model : scene.models) model.move([&](const vec3& v) { return v - opt.center; });
     // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
     leave_out(opt, scene);

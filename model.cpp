@@ -675,34 +675,6 @@ void Model::find_box() {
         for (int i = 0; i < 3; i++) low_[i] = std::min(low_[i], v[i]), high_[i] = std::max(high_[i], v[i]);
 }
 
-bool Model::fit() {
-    vec3 low = low_, high = high_;
-    const double extent = std::max(largest(low), largest(high));
-    constexpr double pixel = 2 / (.75 * 16384);  // [-1,1] are three quarters of a picture's side
-    const bool invisible = largest(high - low) < pixel && !(low == high);
-    if (extent <= 1 && !invisible) return false;
-
-    // First the largest coordinate is brought into [1,2), so that nothing overflows. From there on the numbers are the
-    // same whatever power of two the model is multiplied by, and so are their roundings.
-    const double unit = unit_for(extent);
-    low = low * unit;
-    high = high * unit;
-    const double side = largest(high - low);
-    for (vec3& v : verts_) {
-        v = v * unit;
-        v = (v - low) - (high - v);  // twice the way from the centre, which itself may be no double
-        if (side > 0) v = v / side;
-    }
-    find_box();
-    notes_.push_back("fitted to [-1,1]^3");
-    return true;
-}
-
-void Model::move(const vec3& by) {
-    for (vec3& v : verts_) v = v + by;
-    find_box();
-}
-
 std::string missing_maps(const std::vector<Model>& models) {
     constexpr std::pair<const char*, int> kinds[] = {
         {"diffuse", diffuse_map}, {"normal_map", normal_map}, {"specular", specular_map}, {"glow", glow_map}};

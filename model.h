@@ -84,12 +84,12 @@ public:
     const vec3& low() const { return low_; }
     const vec3& high() const { return high_; }
 
-    // Moves the centre of the box to the origin and scales uniformly so that its largest half-side is 1, if the box is
-    // not within [-1,1]^3 already or is smaller than a pixel of the largest picture. Returns whether it did, which is a
-    // note.
-    bool fit();
-
-    void move(const vec3& by);
+    // Puts each vertex v where to(v) says.
+    template <class F>
+    void move(F&& to) {
+        for (vec3& v : verts_) v = to(v);
+        find_box();
+    }
 
 private:
     void find_box();

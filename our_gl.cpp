@@ -41,6 +41,41 @@ mat4 middle_viewport(int width, int height) {
     return viewport((width - side) / 2, (height - side) / 2, side, side);
 }
 
+bool fit(std::vector<Model>& scene, const vec3& eye) {
+    const mat4 ModelView = lookat(eye, {}, {0, 1, 0});
+    const double distance = norm(eye), reach = 4. / 3;  // where a picture ends whose middle three quarters are [-1,1]^2
+    const auto largest = [](const vec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); };
+    // Times s = 1/need a vertex is seen on the border of [-1,1]^2: there s max(|x|,|y|) = w = 1 - s z/|eye|.
+    const auto need = [&](const vec3& v, double border) {
+        const vec4 p = ModelView * point(v);
+        return std::max(std::fabs(p.x), std::fabs(p.y)) / border + p.z / distance;
+    };
+    vec3 low = scene[0].low(), high = scene[0].high();
+    bool in_view = true;
+    for (const Model& model : scene) {
+        for (int i = 0; i < 3; i++) {
+            low[i] = std::min(low[i], model.low()[i]);
+            high[i] = std::max(high[i], model.high()[i]);
+        }
+        for (const vec3& v : model.verts()) in_view = in_view && need(v, reach) < 1;
+    }
+    const double extent = std::max(largest(low), largest(high));
+    if (extent == 0 || (in_view && largest(high - low) >= 1 && norm(low + high) <= 1)) return false;
+
+    // First the largest coordinate is brought into [1,2), so that nothing overflows. From there on the numbers are the
+    // same whatever power of two the scene is multiplied by, and so are their roundings. (2^1023 is the largest one.)
+    const double unit = std::scalbn(1., std::min(-std::ilogb(extent), 1023));
+    low = low * unit, high = high * unit;
+    double most = 0;
+    for (Model& model : scene) {
+        // Twice the way from the centre, which itself may be no double.
+        model.move([&](const vec3& v) { return (v * unit - low) - (high - v * unit); });
+        for (const vec3& v : model.verts()) most = std::max(most, need(v, 1));
+    }
+    for (Model& model : scene) model.move([&](const vec3& v) { return most > 0 ? v / most : v; });
+    return true;
+}
+
 Camera fitted(const Camera& camera, const Models& models, int size) {
     constexpr double inf = std::numeric_limits<double>::infinity();
     Camera result{camera.ModelView, mat4::identity(), viewport(0, 0, size, size)};

@@ -3,7 +3,7 @@
 //
 // The input is model.obj; a line "=== NAME" in it ends one file and begins another of the names below.
 #include "fuzz.h"
-#include "model.h"
+#include "our_gl.h"
 
 #include <array>
 #include <cmath>
@@ -92,26 +92,21 @@ void check(const Model& model) {
     for (const std::string& note : model.notes()) REQUIRE(is_one_line(note));
 }
 
-// After fit() everything is within [-1,1]^3, the faces touch both of some pair of its sides, and it is done once.
-void check_fit(Model& model) {
-    const bool fitted = model.fit();
-    vec3 low = model.vert(0, 0), high = low;
-    for (int i = 0; i < model.nfaces() * 3; i++) {
-        const vec3& v = model.vert(i / 3, i % 3);
-        for (int k = 0; k < 3; k++) {
-            REQUIRE(v[k] >= -1 && v[k] <= 1);
-            low[k] = std::min(low[k], v[k]), high[k] = std::max(high[k], v[k]);
-        }
+// After fit() every vertex is seen within [-1,1]^2, and some on its border unless all are at one place.
+void check_fit(const Model& model) {
+    std::vector<Model> scene(1, model);
+    if (!fit(scene)) return;
+    const vec3 eye{1, 1, 4};
+    const mat4 ModelView = lookat(eye, {}, {0, 1, 0});
+    double most = 0;
+    bool is_point = true;
+    for (const vec3& v : scene[0].verts()) {
+        REQUIRE(is_finite(v));
+        is_point = is_point && v == scene[0].vert(0);
+        const vec4 p = ModelView * point(v);  // in the square where max(|x|,|y|) is at most w = 1 - z/|eye|
+        most = std::max(most, std::max(std::fabs(p.x), std::fabs(p.y)) + p.z / norm(eye));
     }
-    if (!fitted) return;
-    for (const vec3& v : model.verts()) REQUIRE(is_finite(v));
-    bool is_point = true, touches = false;
-    for (int k = 0; k < 3; k++) {
-        is_point = is_point && low[k] == high[k];
-        touches = touches || (low[k] == -1 && high[k] == 1);
-    }
-    REQUIRE(is_point || touches);
-    REQUIRE(!model.fit());
+    REQUIRE(most <= 1 + 1e-14 && (is_point || most >= 1 - 1e-14));
 }
 
 }  // namespace

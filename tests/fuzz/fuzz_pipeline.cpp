@@ -249,8 +249,8 @@ void draw_lesson(Input& in, bool many) {
     if (more & 16 && !(light == vec3{})) {
         std::vector<Model> models;
         models.emplace_back(file.path());
-        if (!(more & 8)) models[0].fit();
-        models[0].move(-center);
+        if (!(more & 8)) fit(models);
+        models[0].move([&](const vec3& v) { return v - center; });
         check_grid(in, models, light, up);
     }
     words.push_back(file.path().string());

@@ -262,7 +262,7 @@ SCENE(back_faces, "--size 96x96 --shadow off --eye 1.5,3,3 --light .3,1,.5") {
 }
 
 // The eye is in a room: walls run past it on all sides.
-SCENE(eye_inside, "--size 128x96 --shadow off --eye .5,0,.7 --center -.1,-.2,-.5 --light .5,1,.8") {
+SCENE(eye_inside, "--size 128x96 --shadow off --no-fit --eye .5,0,.7 --center -.1,-.2,-.5 --light .5,1,.8") {
     s.box("white", {1, 1, 1}, {-1, -1, -1});
     s.box("red", {-.6, -1, -.8}, {-.2, -.3, -.4});
     s.write("model_diffuse.tga", checkers(6, 4));
@@ -291,7 +291,7 @@ SCENE(wide, "--size 192x48 --shadow off --no-fit --eye 0,0,12 --light 1,1,1") {
 PICTURE(tall, wide, "--size 48x192 --shadow off --no-fit --eye 0,0,12 --light 1,1,1")
 
 // The yard from behind: the block is on the left now.
-PICTURE(from_behind, add_yard, "--size 128x128 --shadow off --eye -1,1,-4 --light .5,1,-.6")
+PICTURE(from_behind, add_yard, "--size 128x128 --shadow off --no-fit --eye -1,1,-4 --light .5,1,-.6")
 
 // Not the origin but the card is looked at, and up is to the upper right: the card is in the middle and leans to the
 // left.
@@ -301,7 +301,7 @@ SCENE(center_and_up, "--size 96x96 --shadow off --no-fit --eye 2,1,1 --center 2,
     s.write("model_diffuse.tga", letter());
 }
 
-// The yard, 40 times as large and far away from the origin: it is fitted, and looks like no_textures.
+// The yard, 40 times as large and far away from the origin: it is fitted.
 SCENE(fitted, "--size 128x128 --shadow-size 512 --eye 1,1.8,5 --light 1,1,.6") {
     s.offset = {1000, -2000, 1500};
     s.size = 40;
@@ -408,20 +408,20 @@ SCENE(specular_dithered, "--size 96x96 --shadow off --eye 0,0,4 --light 1,.6,.1"
 // ---- shadows ----
 
 // No textures at all: geometry, light and shadow.
-PICTURE(no_textures, add_yard, "--size 128x128 --shadow-size 512 --eye 1,1.8,5 --light 1,1,.6")
+PICTURE(no_textures, add_yard, "--size 128x128 --shadow-size 512 --no-fit --eye 1,1.8,5 --light 1,1,.6")
 
 // The same without shadows.
-PICTURE(shadow_off, add_yard, "--size 128x128 --shadow off --eye 1,1.8,5 --light 1,1,.6")
+PICTURE(shadow_off, add_yard, "--size 128x128 --shadow off --no-fit --eye 1,1.8,5 --light 1,1,.6")
 
 // The lesson's test without a bias: what faces the light shadows itself. Its samples all lie to one side of what is
 // looked up there: where that side is nearer to the light a surface is dark as a whole, as the floor is.
-PICTURE(bias_zero, add_yard, "--size 128x128 --shadow-size 128 --bias 0 --eye 1,1.8,5 --light 1,1,.6")
+PICTURE(bias_zero, add_yard, "--size 128x128 --shadow-size 128 --bias 0 --no-fit --eye 1,1.8,5 --light 1,1,.6")
 
 // The same with a shadow buffer of few texels: shadows have teeth as large as they.
-PICTURE(coarse_map, add_yard, "--size 128x128 --shadow-size 24 --eye 1,1.8,5 --light 1,1,.6")
+PICTURE(coarse_map, add_yard, "--size 128x128 --shadow-size 24 --no-fit --eye 1,1.8,5 --light 1,1,.6")
 
 // The same without a shadow buffer: exact.
-PICTURE(exact_shadow, add_yard, "--size 128x128 --shadow exact --eye 1,1.8,5 --light 1,1,.6")
+PICTURE(exact_shadow, add_yard, "--size 128x128 --shadow exact --no-fit --eye 1,1.8,5 --light 1,1,.6")
 
 // Four fences, each twice as high as the one before it. Each throws a shadow twice as long as it is high ...
 SCENE(fences, "--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0") {
@@ -434,7 +434,7 @@ SCENE(fences, "--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0
 PICTURE(fences_lesson_bias, fences, "--size 480x320 --shadow-size 1024 --bias 43.34 --eye -.3,1.6,1.6 --light 2,1,0")
 
 // The light is right above, in the direction of up: the shadow of a table is under it.
-SCENE(light_along_up, "--size 128x128 --shadow-size 512 --eye .6,1.5,4 --light 0,1,0") {
+SCENE(light_along_up, "--size 128x128 --shadow-size 512 --no-fit --eye .6,1.5,4 --light 0,1,0") {
     s.quad("grey", {-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
     s.box("blue", {-.6, .1, -.3}, {.6, .2, .5});
     s.box("blue", {-.6, -.6, .4}, {-.5, .1, .5});
@@ -465,7 +465,7 @@ PICTURE(outside_of_the_map, large_floor,
         "--size 192x64 --shadow-size 512 --bias 43.34 --no-fit --eye 0,7,10 --light .5,1,.8")
 
 // A wall shadows the right half of the floor's letter, which glows all the same.
-SCENE(glow_in_shadow, "--size 128x128 --shadow-size 512 --eye .3,3,3 --light 1,1,0") {
+SCENE(glow_in_shadow, "--size 128x128 --shadow-size 512 --no-fit --eye .3,3,3 --light 1,1,0") {
     s.quad("grey", {-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
     s.write("model_glow.tga", letter(rgb(130, 70, 0), rgb(0, 0, 0)));
     s.next_model();
@@ -485,7 +485,8 @@ TEST("a wrong bias or camera is another picture") {
     const Scene yard(add_yard);
     const TGAImage reference = TGAImage::read_tga_file(fs::path(UMBRA_REFERENCE_DIR) / "no_textures.tga");
     const auto same = [&](const std::string& arguments) {
-        return compare(yard.draw("--size 128x128 --shadow-size 512 --light 1,1,.6 " + arguments), reference).same();
+        const std::string always = "--no-fit --size 128x128 --shadow-size 512 --light 1,1,.6 ";
+        return compare(yard.draw(always + arguments), reference).same();
     };
     CHECK(same("--eye 1,1.8,5"));
     for (const auto* wrong : {"--eye 1,1.8,5 --bias 200", "--eye 1.01,1.8,5", "--eye 1,1.81,5"}) CHECK(!same(wrong));

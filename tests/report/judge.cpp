@@ -7,6 +7,7 @@
 #include <map>
 #include <thread>
 
+#include "our_gl.h"
 #include "scenes.h"
 
 // The same faces in the same order.
@@ -27,12 +28,12 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     for (const char* option : {"-o", "--size", "--shadow-size", "--eye", "--center", "--up", "--light", "--shadow",
                                "--bias", "--draw", "--only", "--threads", "--frames"})
         values[option];
-    bool fit = true;
+    bool fits = true;
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
         const auto option = values.find(*arg);
         const bool is_path = option == values.end() && (arg->size() < 2 || arg->front() != '-');
         (is_path ? paths : towards_light).push_back(*arg);
-        if (*arg == "--no-fit") fit = false;
+        if (*arg == "--no-fit") fits = false;
         if (option != values.end()) towards_light.push_back(option->second = *++arg);
     }
     std::sscanf(values["--size"].c_str(), "%dx%d", &view.width, &view.height);
@@ -41,12 +42,13 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
                                     {"--light", &light}})
         std::sscanf(values[option].c_str(), "%lf,%lf,%lf", &v->x, &v->y, &v->z);
     if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
-    for (const std::string& path : paths) {
-        Model& model = models.emplace_back(path);
-        const std::string name = "copy" + std::to_string(models.size()) + ".obj";
-        towards_light.push_back(folder.write(name, copy_of(model, normalized(light))));
-        if (fit) model.fit();
-        model.move(-view.center);
+    for (const std::string& path : paths) models.emplace_back(path);
+    const std::vector<Model> as_loaded = models;
+    if (fits && fit(models) && values["--light"].empty()) light = {1, 1, 1};
+    for (std::size_t i = 0; i < models.size(); i++) {
+        const std::string name = "copy" + std::to_string(i) + ".obj";
+        towards_light.push_back(folder.write(name, copy_of(as_loaded[i], normalized(light))));
+        models[i].move([&](const vec3& v) { return v - view.center; });
     }
     view.eye = view.eye - view.center;
     view.center = {};

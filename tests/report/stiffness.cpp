@@ -110,7 +110,7 @@ struct Corners {
         for (std::size_t i = 0; i < at.size(); i++)
             scene.polygon({at[i], at[(i + 1) % at.size()], at[(i + 57) % at.size()]});
         std::vector<Model> models(1, Model(umbra.write("scene.obj", scene.text())));
-        models[0].move(-center);
+        models[0].move([&](const vec3& v) { return v - center; });
         if (models[0].nfaces() != static_cast<int>(at.size())) throw std::logic_error("a corner is lost");
         const Camera viewer{lookat(eye - center, {}, {0, 1, 0}), projection(-1 / norm(eye - center)),
                             middle_viewport(size, size)};

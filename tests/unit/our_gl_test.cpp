@@ -46,6 +46,84 @@ TEST("the viewport's corners") {
     }
 }
 
+// A scene of one triangle for each three corners, each a model.
+static std::vector<Model> triangles(const std::vector<vec3>& corners, double scale = 1) {
+    std::vector<Model> scene;
+    for (std::size_t i = 0; i < corners.size(); i += 3)
+        scene.emplace_back(std::vector{corners[i] * scale, corners[i + 1] * scale, corners[i + 2] * scale},
+                           std::vector<vec2>(), std::vector<vec3>(1, vec3{0, 0, 1}),
+                           std::vector<Model::Corner>{{0, -1, 0}, {1, -1, 0}, {2, -1, 0}});
+    return scene;
+}
+
+// Where the default eye sees a vertex: within the middle square, [-1,1]^2, at most 1.
+static double seen_at(const vec3& v) {
+    const vec4 p = projection(-1 / norm(vec3{1, 1, 4})) * lookat({1, 1, 4}, {}, {0, 1, 0}) * point(v);
+    return std::max(std::fabs(p.x), std::fabs(p.y)) / p.w;
+}
+
+TEST("fit leaves alone what is seen as a whole, near the origin and not small") {
+    const auto fits = [](const std::vector<vec3>& corners) {
+        std::vector<Model> scene = triangles(corners);
+        const bool fitted = fit(scene);
+        CHECK(fitted || scene[0].verts() == std::vector(corners.begin(), corners.begin() + 3));
+        return fitted;
+    };
+    CHECK(!fits({{-1, -1, -.5}, {1, 0, 0}, {0, .5, .5}}));
+    CHECK(fits({{-1, -1, -1}, {1, 0, 0}, {0, .5, 1}, {-1, 1, 1}, {1, 1, 1}, {1, -1, 1}}));  // a cube's corners
+    CHECK(!fits({{-.5, 0, 0}, {.5, 0, 0}, {0, .5, 0}}));
+    CHECK(fits({{-.4999, 0, 0}, {.5, 0, 0}, {0, .5, 0}}));
+    CHECK(!fits({{-.5, -.5, .49}, {.5, .5, .49}, {0, 0, .49}}));
+    CHECK(fits({{-.5, -.5, .51}, {.5, .5, .51}, {0, 0, .51}}));
+    CHECK(!fits({{}, {}, {}}));
+    CHECK(fits({{0, 0, 8}, {1, 0, 0}, {-1, 0, -8}}));  // reaches behind the eye
+    // Where the picture ends, 4/3 from the middle: a point on the line through the origin at a right angle to the view.
+    const vec3 right = normalized(cross(vec3{0, 1, 0}, vec3{1, 1, 4}));
+    for (const double reach : {1.333, 1.334}) CHECK_EQ(fits({right * reach, right * -.5, {}}), reach > 4. / 3);
+}
+
+TEST("fit centres the box of all models, and the farthest vertex is on the middle square's border") {
+    Random r(5);
+    for (int k = 0; k < 300; k++) {
+        std::vector<vec3> corners;
+        const double size = std::exp(r.in(-20, 20));
+        for (int i = 0; i < 9; i++) corners.push_back((r.point(1) + vec3{7, 0, -3} * (k % 2 + 1)) * size);
+        std::vector<Model> scene = triangles(corners);
+        CHECK(fit(scene));
+        double most = 0;
+        vec3 low{9, 9, 9}, high = -low;
+        for (const Model& model : scene)
+            for (const vec3& v : model.verts()) {
+                most = std::max(most, seen_at(v));
+                for (int i = 0; i < 3; i++) low[i] = std::min(low[i], v[i]), high[i] = std::max(high[i], v[i]);
+            }
+        CHECK_NEAR(most, 1, 1e-14);
+        CHECK_NEAR(norm(low + high), 0, 1e-14);
+        const vec3 before = corners[8] - corners[0], after = scene[2].vert(2) - scene[0].vert(0);
+        CHECK_NEAR(norm(normalized(before) - normalized(after)), 0, 1e-12);  // one transform for all
+    }
+}
+
+TEST("fit gives the same bits for a scene scaled by any power of two, and is defined to the ends of the range") {
+    const std::vector<vec3> corners{{1.5, 2, .3}, {.7, -1, 2}, {3, 1e-5, 1}, {1, 1e-290, 2}, {2.5, 1, 1}, {1, 2, 3}};
+    const auto fitted = [&](int exponent) {
+        std::vector<Model> scene = triangles(corners, std::ldexp(1., exponent));
+        CHECK(fit(scene));
+        return std::pair(scene[0].verts(), scene[1].verts());
+    };
+    for (const int e : {-700, -100, -20, 1, 3, 20, 100, 500, 1000, 1021}) CHECK(fitted(e) == fitted(0));
+    const double most = 1.7e308, least = 0x1p-1074;
+    for (const std::vector<vec3>& extreme : std::vector<std::vector<vec3>>{
+             {{-most, 0, 0}, {most, 0, most}, {0, most, 0}}, {{least, 0, 0}, {3 * least, 0, 0}, {least, least, 0}},
+             {{5, 6e307, 7}, {5, 6e307, 7}, {5, 6e307, 7}}, {{1e10, 0, 0}, {1e10 + 2e-6, 0, 0}, {1e10, 2e-6, 0}}}) {
+        std::vector<Model> scene = triangles(extreme);
+        CHECK(fit(scene));
+        double size = 0;
+        for (const vec3& v : scene[0].verts()) size = std::max(size, seen_at(v));
+        CHECK_NEAR(size, extreme[0].y > 6e306 ? 0 : 1, 1e-14);  // at one place: the origin
+    }
+}
+
 TEST("Mshadow there and back") {
     Random r(3);
     for (int k = 0; k < 5000; k++) {
