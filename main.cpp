@@ -65,6 +65,7 @@ struct PhongShader final : IShader {
     const Material* material;  // the face's: written by varying(), read by fragment(), as what follows
     vec2 varying_uv[3];        // texture coordinates of a triangle
     vec3 varying_nrm[3];       // normals of the vertices
+    vec3 varying_color[3];     // colours of the vertices, red first
     vec3 varying_eye[3];       // the triangle in eye coordinates, for tangent-space normals
     vec3 varying_sb[3];        // the triangle in the shadow buffer, for the bias and for exact shadows
 
@@ -84,13 +85,18 @@ struct PhongShader final : IShader {
         if (shadow.method != Options::Method::off) varying_sb[nthvert] = project(shadow.M * point(v));
         if (!material->normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
+        if (model.has_colors()) varying_color[nthvert] = model.color(iface, nthvert);
         if (material->tangent) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
     }
 
     Color fragment(const Fragment& f) const override {
-        const vec<2, coord> uv = wrapped(interpolated(varying_uv, f.bar));
-        const Color texel = material->diffuse ? Texels(*material->diffuse, uv).bgr() : Color{255, 255, 255};
-        const vec<3, real> n = normal(uv, f.bar);
+        const UV uv = interpolated(varying_uv, f.bar);
+        Color texel = material->diffuse ? Texels(material->diffuse, uv).bgr() : Color{255, 255, 255};
+        if (model.has_colors()) {
+            const vec<3, real> rgb = to_real(interpolated(varying_color, f.bar));
+            texel = {texel.x * rgb.z, texel.y * rgb.y, texel.z * rgb.x};
+        }
+        const vec<3, real> n = normal(uv, f);
         const vec3 l = uniform_l;
         const real diff = max(0, dot(n, l));
         const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow, no highlight
@@ -98,10 +104,11 @@ struct PhongShader final : IShader {
         real spec = 0;
         if (any(facing) && material->specular) {
             const vec<3, real> r = n * (2 * dot(n, l)) - l;  // reflected light; the viewer is far off at +z
-            spec = select(facing & (r.z > 0), power(r.z, Texels(*material->specular, uv)[0]), 0);
+            spec = select(facing & (r.z > 0), power(r.z, Texels(material->specular, uv)[0]), 0);
         }
         const real shadow_factor = .3 + .7 * select(lit, 1, 0);
-        const Color glow = material->glow ? Texels(*material->glow, uv).bgr() : Color{0, 0, 0};
+        const vec3 Ke = material->Ke * 255;
+        const Color glow = material->glow ? Texels(material->glow, uv).bgr() : Color{Ke.z, Ke.y, Ke.x};
         Color c;
         for (int i = 0; i < 3; i++)  // Kd has red first
             c[i] = 20 + texel[i] * material->Kd[2 - i] * ((1.2 * diff + .6 * spec) * shadow_factor) + glow[i];
@@ -123,21 +130,23 @@ struct PhongShader final : IShader {
         return !(stored > sb_p.z + bias);  // so written because nothing but a number shadows
     }
 
-    vec<3, real> normal(const vec<2, coord>& uv, const vec<3, coord>& bar) const {  // of length 1
+    vec<3, real> normal(const UV& uv, const Fragment& f) const {  // of length 1
         if (material->normal)
-            return normalized((uniform_MIT * direction(Texels(*material->normal, uv).normal())).xyz());
-        const vec<3, real> n = normalized(to_real(interpolated(varying_nrm, bar)));
+            return normalized((uniform_MIT * direction(Texels(material->normal, uv).normal())).xyz());
+        vec<3, real> n = normalized(to_real(interpolated(varying_nrm, f.bar)));
+        if (!f.front_facing && model.has_made_normals(f.face)) n = -n;  // faces may wind either way round
         if (!material->tangent) return n;
         // Darboux frame (i, j, n): i is the direction across n in which u grows, at a right angle to the one along the
         // face in which u stays the same; j that of v. Found one by one, because a mirrored texture turns one of them
         // round. No frame where uv do not span a plane.
         const vec3 e1 = varying_eye[1] * .5 - varying_eye[0] * .5, e2 = varying_eye[2] * .5 - varying_eye[0] * .5;
-        const vec2 du = normalized(vec2{varying_uv[1].x - varying_uv[0].x, varying_uv[2].x - varying_uv[0].x});
-        const vec2 dv = normalized(vec2{varying_uv[1].y - varying_uv[0].y, varying_uv[2].y - varying_uv[0].y});
+        const vec2 uv1 = varying_uv[1] - varying_uv[0], uv2 = varying_uv[2] - varying_uv[0];
+        const vec2 du = normalized(vec2{uv1.x, uv2.x} * material->tangent.scale.x);
+        const vec2 dv = normalized(vec2{uv1.y, uv2.y} * material->tangent.scale.y);
         const real side = select(dot(cross(normalized(e1), normalized(e2)), n) < 0, -1, 1);  // of the face that n is on
         const vec<3, real> i = normalized(cross(normalized(e2 * du.x - e1 * du.y), n)) * side;
         const vec<3, real> j = normalized(cross(normalized(e2 * dv.x - e1 * dv.y), n)) * side;
-        const vec<3, real> t = Texels(*material->tangent, uv).normal();
+        const vec<3, real> t = Texels(material->tangent, uv).normal();
         return normalized(i * t.x + j * t.y + n * t.z);
     }
 };
@@ -334,6 +343,22 @@ static void write(const Options& opt, const Shadow& shadow, const TGAImage& fram
         if (file) file->commit();
 }
 
+// The names of the kinds of map that no material of any model has, each after a comma.
+static std::string missing_maps(const std::vector<Model>& models) {
+    const auto is_missing = [&](Map Material::*map) {
+        for (const Model& model : models)
+            for (const Material& m : model.materials())
+                if (m.*map) return false;
+        return true;
+    };
+    std::string names;
+    if (is_missing(&Material::diffuse)) names += ",diffuse";
+    if (is_missing(&Material::normal) && is_missing(&Material::tangent)) names += ",normal_map";
+    if (is_missing(&Material::specular)) names += ",specular";
+    if (is_missing(&Material::glow)) names += ",glow";
+    return names;
+}
+
 static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -371,15 +396,14 @@ static void run(Options opt) {
     write(opt, shadow, frame);
     const double written = milliseconds();
     if (opt.quiet) return;
-    std::string left_out = missing_maps(scene.models);
-    if (scene.casters.empty()) left_out += left_out.empty() ? "shadow" : ",shadow";
-    if (left_out.empty()) left_out = "-";
+    const std::string left_out = missing_maps(scene.models) + (scene.casters.empty() ? ",shadow" : "");
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
                 "shadow_bytes %zu outside %ld between_samples %ld hidden %ld models %zu seen %zu casters %zu "
                 "left_out %s\n",
                 c.triangles, c.shaded, c.shaded, loaded - start, median(depth_ms), median(shade_ms), written - drawn,
                 shadow.shadowbuffer.bytes() + shadow.grid.bytes(), c.outside, c.between_samples, c.covered - c.shaded,
-                scene.models.size(), scene.seen.size(), scene.casters.size(), left_out.c_str());
+                scene.models.size(), scene.seen.size(), scene.casters.size(),
+                left_out.empty() ? "-" : left_out.c_str() + 1);
 }
 
 int main(int argc, char** argv) try {

@@ -10,10 +10,11 @@
 #include <cstdio>
 #include <cstring>
 #include <deque>
+#include <fstream>
 #include <future>
 #include <map>
 #include <memory>
-#include <numbers>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <thread>
@@ -38,9 +39,25 @@ std::string in_quotes(std::string_view text) {
     return "'" + out + (text.size() > 60 ? "...'" : "'");
 }
 
+// Of each kind of thing there is one note: of the first one, and how many there are.
+using Notes = std::vector<Model::Note>;
+Model::Note* find(Notes& notes, const std::string& what) {
+    const auto note = std::find_if(notes.begin(), notes.end(), [&](const Model::Note& n) { return n.what == what; });
+    return note == notes.end() ? nullptr : &*note;
+}
+void add(Notes& notes, const Model::Note& note) {
+    if (Model::Note* const same = find(notes, note.what)) same->count += note.count;
+    else notes.push_back(note);
+}
+
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\0'; }  // '\0': see join_lines
 bool ends_word(char c) { return is_blank(c) || c == '\n' || c == '#'; }
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; }
+std::string lower(std::string text) {
+    for (char& c : text) c = lower(c);
+    return text;
+}
 template <typename Char>
 Char* find(char c, Char* begin, Char* end) {
     return static_cast<Char*>(std::memchr(begin, c, end - begin));
@@ -60,12 +77,30 @@ void join_lines(char* begin, char* end) {
     }
 }
 
+// What else is found under the name of an .obj, by its first bytes.
+constexpr std::pair<std::string_view, const char*> other_files[] = {
+    {"solid", "STL"}, {"ply", "PLY"}, {"glTF", "glTF"}, {"{", "glTF or JSON"}, {"<", "HTML or XML"},
+    {"\x1F\x8B", "gzip"}, {"PK\3\4", "ZIP"}, {"Kaydara FBX", "FBX"}, {"BLENDER", "Blender"},
+    {"\xFF\xFE", "UTF-16"}, {"\xFE\xFF", "UTF-16"}, {"version https://git-lfs", "Git LFS pointer ('git lfs pull')"}};
+
 // A whole text file, its lines joined and each ended by '\n', the last one too.
 FileBytes read_text(const fs::path& path) {
     FileBytes text = read_file(path, 1);
-    if (text.begin == text.end || text.end[-1] != '\n') *text.end++ = '\n';
-    if (find('\0', text.begin, text.end)) throw std::runtime_error(path.string() + ": is a binary file, not text");
-    if (std::string_view(text.begin, text.end).starts_with("\xEF\xBB\xBF")) text.begin += 3;  // UTF-8's byte order mark
+    const std::string_view all(text.begin, text.end);
+    const auto refuse = [&](const std::string& kind) {
+        throw std::runtime_error(path.string() + ": is a " + kind + " file, not a text of vertices and faces");
+    };
+    for (const auto& [bytes, kind] : other_files)
+        if (all.starts_with(bytes)) refuse(kind);
+    if (all.size() >= 84) {  // or STL that is not text: 80 bytes, the number of faces, 50 bytes for each
+        std::uint32_t n;
+        std::memcpy(&n, &all[80], 4);
+        if (all.size() == 84 + 50 * std::uint64_t{n}) refuse("STL");
+    }
+    if (all.empty() || all.back() != '\n') *text.end++ = '\n';
+    if (find('\0', text.begin, text.end)) refuse("binary");
+    if (all.starts_with("\xEF\xBB\xBF")) text.begin += 3;  // UTF-8's byte order mark
+    if (find('\n', text.begin, text.end) == text.end - 1) std::replace(text.begin, text.end, '\r', '\n');
     join_lines(text.begin, text.end);
     return text;
 }
@@ -73,8 +108,8 @@ FileBytes read_text(const fs::path& path) {
 // Reads [BEGIN,END), a whole text or a part that ends with '\n', after join_lines. NAME is for messages.
 class Scanner {
 public:
-    Scanner(const fs::path& name, const char* begin, const char* end)
-        : name_(name.string()), at_(begin), end_(end), counted_(begin) {}
+    Scanner(const fs::path& name, const FileBytes& text)
+        : name_(name), begin_(text.begin), at_(text.begin), end_(text.end) {}
 
     bool is_done() const { return at_ == end_; }
     void next_line() { at_ = (*at_ == '\n' ? at_ : find('\n', at_, end_)) + 1; }
@@ -83,6 +118,7 @@ public:
         return *at_ == '\n' || *at_ == '#';
     }
     const char* position() const { return at_; }
+    void go_back(const char* position) { at_ = position; }
     char peek() const { return *at_; }
     bool skip(char c) {
         if (*at_ != c) return false;
@@ -96,10 +132,13 @@ public:
         while (!ends_word(*end)) end++;
         return {at_, end};
     }
-    std::string_view word() {
-        const std::string_view w = peek_word();
-        at_ += w.size();
-        return w;
+    bool skip_word(std::string_view keyword) {  // in small letters or others
+        at_end();
+        for (std::size_t i = 0; i < keyword.size(); i++)
+            if (lower(at_[i]) != keyword[i]) return false;
+        if (!ends_word(at_[keyword.size()])) return false;
+        at_ += keyword.size();
+        return true;
     }
     std::string rest() {  // of the line, without blanks at its ends: a name may contain blanks and '#'
         at_end();
@@ -110,40 +149,20 @@ public:
         return text;
     }
 
-    // A finite number. What is too small is zero or denormal.
-    double real() {
-        // Most numbers are short: up to 15 digits make an integer below 2^53, and 10^15 is a double too, so one
-        // division rounds correctly and gives what from_chars gives, in less time.
-        static constexpr double power_of_ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
-                                                  1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
-        const char* p = at_ + (*at_ == '-' || *at_ == '+');
-        const char *const first = p, *point = nullptr;
-        std::uint64_t digits = 0;  // wraps round where there are too many, and then is not used
-        for (; is_digit(*p) || (*p == '.' && !point); p++) {
-            if (*p == '.') point = p;
-            else digits = digits * 10 + static_cast<unsigned>(*p - '0');
-        }
-        const std::ptrdiff_t length = p - first - (point ? 1 : 0);
-        if (length > 0 && length <= 15 && ends_word(*p)) {
-            const double value = static_cast<double>(digits) / power_of_ten[point ? p - point - 1 : 0];
-            return *std::exchange(at_, p) == '-' ? -value : value;
-        }
-        double value = 0;
+    // A finite number, or false. What is too small is zero or denormal.
+    bool real(double& value) {
         const auto [end, error] = std::from_chars(after_plus(), end_, value);
         if (error == std::errc::result_out_of_range)  // too large or too small: strtod says which
             value = std::strtod(std::string(after_plus(), end).c_str(), nullptr);
-        if (error == std::errc::invalid_argument || !std::isfinite(value) || !ends_word(*end))
-            fail_word("finite number");
+        if (error == std::errc::invalid_argument || !std::isfinite(value) || !ends_word(*end)) return false;
         at_ = end;
-        return value;
+        return true;
     }
     template <int size>
-    int reals(vec<size>& kept) {  // all up to the end of the statement: how many there are; as many as fit are kept
+    int reals(vec<size>& kept) {  // those up to what is none: how many there are; as many as fit are kept
         int n = 0;
-        for (; !at_end(); n++) {
-            const double value = real();
+        for (double value = 0; !at_end() && real(value); n++)
             if (n < size) kept[n] = value;
-        }
         return n;
     }
     int integer(const char* what) {  // its magnitude is below 2^31
@@ -158,26 +177,30 @@ public:
         return static_cast<int>(value);
     }
 
-    std::string place(const char* position) {  // FILE:LINE; counts on from the last one: positions must not go back
-        line_ += std::count_if(counted_, position, [](char c) { return c == '\n' || c == '\0'; });
-        counted_ = position;
-        return name_ + ":" + std::to_string(line_) + ": ";
+    void note(Notes& notes, const char* what) const {
+        if (Model::Note* const same = find(notes, what)) same->count++;  // its place need not be found
+        else notes.push_back({what, name_.filename().string() + ':' + line()});
     }
     [[noreturn]] void fail_word(const char* what) { fail(in_quotes(peek_word()) + " is no " + what); }
-    [[noreturn]] void fail(const std::string& what) { throw std::runtime_error(place(at_) + what); }
+    [[noreturn]] void fail(const std::string& what) {
+        throw std::runtime_error(name_.string() + ':' + line() + ": " + what);
+    }
 
 private:
     const char* after_plus() const { return at_ + (*at_ == '+' && at_[1] != '-'); }
+    std::string line() const {
+        const auto before = std::count_if(begin_, at_, [](char c) { return c == '\n' || c == '\0'; });
+        return std::to_string(before + 1);
+    }
 
-    std::string name_;
-    const char *at_, *end_, *counted_;
-    std::int64_t line_ = 1;  // of counted_
+    fs::path name_;
+    const char *begin_, *at_, *end_;
 };
 
 // ---- the .obj ----
 
-// What the file says. Its indices are right, those of normals but for the corners that have none. Faces are triangles
-// already; those of a polygon are a fan, to be cut better.
+// What the file says. Its indices are right; corners without a normal have -1. Faces are triangles already; those of a
+// polygon are a fan, to be cut better.
 class Obj : Scanner {
 public:
     struct Polygon {
@@ -188,70 +211,97 @@ public:
         std::string material;
     };
     std::vector<vec3> verts, normals;
+    std::vector<vec3> colors;  // of all vertices or of none
     std::vector<vec2> uvs;
     std::vector<Corner> corners;
     std::vector<Polygon> polygons;
     std::vector<Run> runs{{0, ""}};
+    std::vector<int> groups;  // the smoothing group of each face, 0 for facets; or of none
     std::vector<std::string> libraries;
+    Notes notes;
     bool lacks_normals = false;  // some corner has none, or some normal has no length
 
     int nfaces() const { return static_cast<int>(corners.size() / 3); }
     Corner* corners_of(int face) { return corners.data() + 3 * std::ptrdiff_t{face}; }
 
-    Obj(const fs::path& path, const FileBytes& text) : Scanner(path, text.begin, text.end) {
+    Obj(const fs::path& path, const FileBytes& text) : Scanner(path, text) {
         // About what a mesh of many faces comes to: to grow costs a copy and fresh memory, a fifth of the loading time.
         const std::ptrdiff_t bytes = text.end - text.begin;
         verts.reserve(bytes / 96), uvs.reserve(bytes / 96), normals.reserve(bytes / 96), corners.reserve(bytes / 32);
         const char* kept = text.begin;
         for (; !is_done(); next_line()) {
             if (position() - kept > 1 << 24) text.forget_before(kept = position());  // else all of it is held at once
-            const std::string_view first = word();
-            if (first == "v") verts.push_back(vector<3>(3, "a vertex needs three coordinates"));
-            else if (first == "vt") uvs.push_back(vector<2>(1, "a texture coordinate needs a number"));
-            else if (first == "vn") normals.push_back(normalized(vector<3>(3, "a normal needs three coordinates")));
-            else if (first == "f") face();
-            else if (first == "usemtl") runs.push_back({nfaces(), rest()});
-            else if (first == "mtllib") libraries.push_back(rest());
-            // o, g, s, lines, curves and what nobody knows are passed over
+            if (skip_word("v")) vertex();
+            else if (skip_word("vt")) uvs.push_back(vector<2>(1));
+            else if (skip_word("vn")) normals.push_back(normalized(vector<3>(3)));
+            else if (skip_word("f")) face();
+            else if (skip_word("usemtl")) runs.push_back({nfaces(), rest()});
+            else if (skip_word("mtllib")) libraries.push_back(rest());
+            else if (skip_word("s")) smooth();
+            // o, g, lines, curves and what nobody knows are passed over
         }
         if (std::find(normals.begin(), normals.end(), vec3{}) != normals.end()) lacks_normals = true;
-        const int counts[] = {count(verts), count(uvs), count(normals)};
+        if (group_) groups.resize(nfaces(), *group_);
         for (const Forward& f : forward_)
-            if (f.index > counts[f.kind])
-                throw std::runtime_error(place(f.position) + kinds[f.kind] + " " + std::to_string(f.index) +
-                                         ", but the file has only " + std::to_string(counts[f.kind]));
+            if (f.vert >= count(verts)) fail_vertex(f.position);
+        for (Corner& c : corners) {
+            const bool is_uv = c.uv < count(uvs) && c.uv >= -1, is_normal = c.normal < count(normals) && c.normal >= -1;
+            if (is_uv && is_normal) continue;
+            add(notes, {"an index of a normal or texture coordinate that is not there, left out",
+                        "face " + std::to_string((&c - corners.data()) / 3 + 1)});
+            if (!is_uv) c.uv = -1;
+            if (!is_normal) c.normal = -1, lacks_normals = true;
+        }
         if (corners.empty()) throw std::runtime_error(path.string() + ": no faces");
     }
 
 private:
-    enum Kind { vertex, texture, normal };
-    static constexpr const char* kinds[] = {"vertex index", "texture index", "normal index"};
-    struct Forward {  // an index of something that had not been defined yet: checked at the end
+    static constexpr int nowhere = INT_MIN;
+    struct Forward {  // a vertex that had not been defined yet: checked at the end
         const char* position;
-        Kind kind;
-        int index;
+        int vert;
     };
 
+    void vertex() {
+        vec<6> v;  // the place, then a weight, or red, green and blue
+        const int n = reals(v);
+        if (n < 3 && !at_end()) fail_word("finite number");
+        if (n < 3) fail("a vertex needs three coordinates");
+        if (!at_end()) note(notes, "a colour that is no number, left out");
+        verts.push_back({v[0], v[1], v[2]});
+        if (n != 6 && colors.empty()) return;
+        colors.resize(verts.size(), {1, 1, 1});
+        for (int i = 0; i < 3 && n == 6; i++) colors.back()[i] = std::clamp(v[3 + i], 0., 1.);
+    }
     template <int size>
-    vec<size> vector(int least, const char* needs) {  // what follows is a weight or colours
+    vec<size> vector(int least) {  // what follows is a weight
         vec<size> v;
-        if (reals(v) < least) fail(needs);
-        return v;
+        if (reals(v) >= least && at_end()) return v;
+        note(notes, "a normal or texture coordinate that is no number, left out");
+        return {};
+    }
+    void smooth() {  // what is no number is "off"
+        groups.resize(nfaces(), group_.value_or(0));
+        group_ = static_cast<int>(std::strtol(rest().c_str(), nullptr, 10));
     }
     // An index as written, from 1 or from the end of what has been defined so far, made one from 0.
-    int index(Kind kind, int defined) {
-        const int i = integer(kinds[kind]);
-        if (i > defined) forward_.push_back({position(), kind, i});
-        if (i > 0) return i - 1;
-        if (i < 0 && -i <= defined) return defined + i;
-        fail(std::string(kinds[kind]) + " " + std::to_string(i) +
-             (i == 0 ? " (indices count from 1)" : ", but only " + std::to_string(defined) + " are defined so far"));
+    int index(const char* what, int defined) {
+        const int i = integer(what);
+        return i > 0 ? i - 1 : i < 0 && i >= -defined ? defined + i : nowhere;
+    }
+    [[noreturn]] void fail_vertex(const char* position) {
+        go_back(position);
+        const std::string i = std::to_string(integer(""));
+        fail("vertex index " + i + ": " + std::to_string(count(verts)) + " are defined, counted from 1");
     }
     Corner corner() {  // v, v/vt, v//vn or v/vt/vn; v/ and v// are seen too
-        Corner c{index(vertex, count(verts)), -1, -1};
+        const char* const begin = position();
+        Corner c{index("vertex index", count(verts)), -1, -1};
+        if (c.vert < 0) fail_vertex(begin);
+        if (c.vert >= count(verts)) forward_.push_back({begin, c.vert});
         const bool has_more = skip('/');
-        if (has_more && peek() != '/' && !at_word_end()) c.uv = index(texture, count(uvs));
-        if (has_more && skip('/') && !at_word_end()) c.normal = index(normal, count(normals));
+        if (has_more && peek() != '/' && !at_word_end()) c.uv = index("texture index", count(uvs));
+        if (has_more && skip('/') && !at_word_end()) c.normal = index("normal index", count(normals));
         if (!at_word_end()) fail("garbage after a number: " + in_quotes(peek_word()));
         if (c.normal < 0) lacks_normals = true;
         return c;
@@ -266,20 +316,17 @@ private:
             if (n >= 2) corners.insert(corners.end(), {first, previous, c});
             previous = c;
         }
-        if (n < 3) fail("a face needs three corners, this one has " + std::to_string(n));
+        if (n < 3) note(notes, "a face of fewer than three corners, left out");
         if (n > 3) polygons.push_back({begin, n});
     }
 
+    std::optional<int> group_;  // since there has been one
     std::vector<Forward> forward_;
 };
 
 // ---- polygons ----
 
 double largest(const vec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
-
-// The power of two that brings X > 0 into [1,2), so that products of what is no larger neither overflow nor vanish; it
-// rounds nothing. (A denormal X comes out smaller: 2^1023 is the largest power of two.)
-double unit_for(double x) { return std::scalbn(1., std::min(-std::ilogb(x), 1023)); }
 
 // Twice the signed area of the triangle abc, positive where it is counterclockwise.
 double area2(const vec2& a, const vec2& b, const vec2& c) {
@@ -324,7 +371,8 @@ private:
         }
         if (!(span > 0)) return false;
         if (!std::isfinite(span)) return project(verts, .25);  // a difference has overflowed
-        const double unit = unit_for(span);
+        // A power of two, which rounds nothing: products neither overflow nor vanish. (2^1023 is the largest one.)
+        const double unit = std::scalbn(1., std::min(-std::ilogb(span), 1023));
         for (Node& node : ring_) node.relative = node.relative * unit;
         vec3 newell;  // twice the polygon's area along its normal
         for (int i = 1; i + 1 < count(ring_); i++) newell = newell + cross(ring_[i].relative, ring_[i + 1].relative);
@@ -392,68 +440,95 @@ struct Face {  // a triangle's unit normal and its angles; zeros where it has no
 
 Face measure(const vec3& a, const vec3& b, const vec3& c) {
     vec3 edges[] = {b - a, c - b, a - c};
-    const double length = std::max({largest(edges[0]), largest(edges[1]), largest(edges[2])});
-    if (!std::isfinite(length)) return measure(a * .25, b * .25, c * .25);  // a difference has overflowed
-    if (!(length > 0)) return {};
-    const double unit = unit_for(length);
-    for (vec3& e : edges) e = e * unit;
-
-    // The two edges across from the longest one have the best-conditioned cross product.
-    const double squares[] = {dot(edges[0], edges[0]), dot(edges[1], edges[1]), dot(edges[2], edges[2])};
-    const std::ptrdiff_t i = std::max_element(squares, squares + 3) - squares;
-    const vec3 across = cross(edges[(i + 1) % 3], edges[(i + 2) % 3]);
-    const double area = norm(across);  // twice: the product of any two edges' lengths and the sine between them
-
-    // An edge's coordinate is a difference rounded once, a product of two is off by 3 half-units in the last place, and
-    // their difference by another: a component pq - rs by 2 epsilon (|pq| + |rs|), no more than 2 epsilon times the two
-    // lengths, and the whole by less than twice that. So little area may be none.
-    if (area <= 4 * epsilon * std::sqrt(squares[(i + 1) % 3] * squares[(i + 2) % 3])) return {};
-    Face face{normalized(across)};
-    for (int k = 0; k < 3; k++) face.angles[k] = std::atan2(area, -dot(edges[k], edges[(k + 2) % 3]));
-    return face;
+    if (!std::isfinite(largest(edges[0]) + largest(edges[1]) + largest(edges[2])))
+        return measure(a * .25, b * .25, c * .25);  // a difference has overflowed
+    for (vec3& e : edges) e = normalized(e);
+    // The largest of the three sines has the best-conditioned cross product. An edge's coordinates are off by 3 epsilon
+    // at most (half for the difference, the rest for the length and the quotient), which turns it by no more than 6: an
+    // angle of 12 may be none.
+    Face face;
+    double most = 12 * epsilon;
+    for (int k = 0; k < 3; k++) {
+        const vec3 across = cross(edges[(k + 2) % 3], edges[k]);
+        const double sine = norm(across);
+        face.angles[k] = std::atan2(sine, -dot(edges[(k + 2) % 3], edges[k]));
+        if (sine > most) most = sine, face.normal = normalized(across);
+    }
+    return face.normal == vec3{} ? Face{} : face;
 }
 
 // Gives a normal to each corner without one, or with one of no length: the mean of the normals of the faces around its
 // vertex, each weighted by its angle there (G. Thuermer and C. Wuethrich, "Computing vertex normals from polygonal
-// facets", 1998), which does not depend on how the polygons have been cut.
+// facets", 1998), which does not depend on how the polygons have been cut. Only those faces count that are reached from
+// its own across smooth edges: within a smoothing group where the file has any, else those of up to 60 degrees.
 void make_normals(Obj& obj) {
+    // The cosine of 60 degrees, less what coordinates of five digits may miss: so a column of six sides is smooth.
+    constexpr double sharpest = .4999;
+    std::vector<Face> faces(obj.nfaces());
+    for (int f = 0; f < obj.nfaces(); f++) {
+        const Corner* const c = obj.corners_of(f);
+        faces[f] = measure(obj.verts[c[0].vert], obj.verts[c[1].vert], obj.verts[c[2].vert]);
+    }
+    const auto is_flat = [&](int corner) { return faces[corner / 3].normal == vec3{}; };
+    const auto is_smooth = [&](int f, int g) {
+        if (obj.groups.empty()) return dot(faces[f].normal, faces[g].normal) >= sharpest;
+        return obj.groups[f] == obj.groups[g] && obj.groups[f] != 0;
+    };
+
+    // The corners around vertex v are around[first[v]] to around[first[v + 1]], those of earlier faces first.
+    std::vector<int> first(obj.verts.size() + 2), around(obj.corners.size());
+    for (const Corner& c : obj.corners) first[c.vert + 2]++;
+    for (std::size_t v = 1; v < first.size(); v++) first[v] += first[v - 1];
+    for (int i = 0; i < count(obj.corners); i++) around[first[obj.corners[i].vert + 1]++] = i;
+
     struct Sum {
         vec3 normals;
         double angles = 0;
-        int faces = 0;
+        int faces = 0, normal = -1;  // the last is its index
     };
-    std::vector<Sum> sums(obj.verts.size());
-    const auto face_of = [&](const Corner* c) {
-        return measure(obj.verts[c[0].vert], obj.verts[c[1].vert], obj.verts[c[2].vert]);
+    std::vector<Sum> sums;
+    std::vector<int> parents;                  // a tree of corners for each smooth fan of faces
+    std::vector<std::pair<int, int>> edges;    // to that vertex, of that corner
+    const auto root = [&](int j) {
+        while (parents[j] != j) j = parents[j] = parents[parents[j]];
+        return j;
     };
-    for (int f = 0; f < obj.nfaces(); f++) {
-        const Corner* const c = obj.corners_of(f);
-        const Face face = face_of(c);
-        for (int k = 0; k < 3; k++) {
-            Sum& sum = sums[c[k].vert];
-            sum = {sum.normals + face.normal * face.angles[k], sum.angles + face.angles[k], sum.faces + 1};
+    for (int v = 0; v < count(obj.verts); v++) {
+        const int* const own = &around[first[v]];
+        const int n = first[v + 1] - first[v];
+        const auto solid = static_cast<int>(std::find_if_not(own, own + n, is_flat) - own);
+        parents.resize(n), edges.clear();
+        for (int j = 0; j < n; j++) {
+            parents[j] = is_flat(own[j]) && solid < n ? solid : j;  // what has no area goes with its neighbours
+            for (int k = 1; k < 3 && !is_flat(own[j]); k++)
+                edges.push_back({obj.corners_of(own[j] / 3)[(own[j] + k) % 3].vert, j});
         }
-    }
-    // A sum of n terms is off by at most n half-units of the sum of their sizes, its terms themselves by less than 4
-    // units each. No more than that is left where the faces cancel, as on the two sides of a sheet: then a face has its
-    // own normal, or an upright one where it has no area.
-    const int first_mean = count(obj.normals);
-    for (const Sum& sum : sums) {
-        const double noise = (sum.faces + 4) * sum.angles * epsilon;
-        obj.normals.push_back(norm(sum.normals) > noise ? normalized(sum.normals) : vec3{});
-    }
-    for (int f = 0; f < obj.nfaces(); f++) {
-        int own = -1;
-        for (int k = 0; k < 3; k++) {
-            int& normal = obj.corners_of(f)[k].normal;
-            if (normal < 0 || obj.normals[normal] == vec3{}) normal = first_mean + obj.corners_of(f)[k].vert;
-            if (!(obj.normals[normal] == vec3{})) continue;
-            if (own < 0) {
-                own = count(obj.normals);
-                const vec3 n = face_of(obj.corners_of(f)).normal;
-                obj.normals.push_back(n == vec3{} ? vec3{0, 0, 1} : n);
-            }
-            normal = own;
+        std::sort(edges.begin(), edges.end());
+        for (std::size_t e = 1; e < edges.size(); e++) {
+            const auto [to, j] = edges[e];
+            const auto [same, i] = edges[e - 1];
+            if (to == same && is_smooth(own[i] / 3, own[j] / 3)) parents[root(j)] = root(i);
+        }
+        sums.assign(n, {});
+        for (int j = 0; j < n; j++) {
+            const Face& face = faces[own[j] / 3];
+            const double angle = face.angles[own[j] % 3];
+            Sum& sum = sums[root(j)];
+            sum = {sum.normals + face.normal * angle, sum.angles + angle, sum.faces + 1};
+        }
+        for (int j = 0; j < n; j++) {
+            int& normal = obj.corners[own[j]].normal;
+            if (normal >= 0 && !(obj.normals[normal] == vec3{})) continue;
+            // A sum of n terms is off by at most n half-units of the sum of their sizes, its terms themselves by less
+            // than 4 units each. No more than that is left where the faces cancel, as on the two sides of a sheet: then
+            // a face has its own normal, or an upright one where it has no area.
+            Sum& sum = sums[root(j)];
+            const vec3 face = faces[own[j] / 3].normal;
+            const bool cancels = norm(sum.normals) <= (sum.faces + 4) * sum.angles * epsilon;
+            normal = cancels || sum.normal < 0 ? count(obj.normals) : sum.normal;
+            if (normal < count(obj.normals)) continue;
+            obj.normals.push_back(!cancels ? normalized(sum.normals) : face == vec3{} ? vec3{0, 0, 1} : face);
+            sum.normal = normal;
         }
     }
 }
@@ -465,12 +540,14 @@ constexpr Map Material::*map_members[] = {&Material::diffuse, &Material::normal,
                                                &Material::specular, &Material::glow};
 constexpr const char* map_suffixes[] = {"_diffuse.tga", "_nm.tga", "_nm_tangent.tga", "_spec.tga", "_glow.tga"};
 
-using Notes = std::vector<std::string>;
-
+struct MtlMap {
+    std::string path;  // empty where there is none
+    Map map;           // without a picture
+};
 struct MtlMaterial {
-    vec3 Kd{1, 1, 1};
-    std::string maps[map_count + 1];  // paths, empty where there is none; bump_map is for where there is no tangent_map
-    Notes notes;                      // for when it is used
+    vec3 Kd{1, 1, 1}, Ke;
+    MtlMap maps[map_count + 1];  // bump_map is for where there is no tangent_map
+    Notes notes;                 // for when it is used
 };
 using Library = std::map<std::string, MtlMaterial>;
 
@@ -481,21 +558,23 @@ std::string_view take_word(std::string_view& text) {
     return word;
 }
 
-// What is left of "-bm 1 -s 2 2 2 -clamp on the file.tga" without options: each has a word and the numbers after it.
-std::string without_options(std::string_view text) {
+// Of "-s 2 2 2 -bm 1 -clamp on the file.tga" the options, and what is left is the name. Each has a word and the numbers
+// after it.
+std::string take_options(std::string_view text, Map& map) {
     while (text.starts_with('-')) {
-        take_word(text);
-        take_word(text);
-        for (auto rest = text; !rest.empty() && take_word(rest).find_first_not_of("+-.0123456789eE") == rest.npos;)
+        const std::string_view option = take_word(text);
+        vec2* const target = option == "-s" ? &map.scale : option == "-o" ? &map.offset : nullptr;
+        for (int i = 0; !text.empty(); i++) {
+            auto rest = text;
+            const std::string number(take_word(rest));
+            if (i > 0 && number.find_first_not_of("+-.0123456789eE") != number.npos) break;
             text = rest;
+            double value = 0;
+            if (target && i < 2 && std::sscanf(number.c_str(), "%lf", &value) == 1 && std::isfinite(value))
+                (*target)[i] = value, map.is_moved = true;
+        }
     }
     return std::string(text);
-}
-
-// The path of a file that is named in another one, where programs of another system may have written '\' for '/'.
-fs::path beside(const fs::path& file, std::string name) {
-    std::replace(name.begin(), name.end(), '\\', '/');
-    return (file.parent_path() / name).lexically_normal();
 }
 
 bool is_there(const fs::path& path) {
@@ -503,39 +582,70 @@ bool is_there(const fs::path& path) {
     return fs::exists(path, ignored);
 }
 
+// The path of a file that is named in another one, be it beside that or beside what that is a link to; empty where
+// there is none. Programs of other systems write '\' for '/', the whole path on another machine, and other capitals:
+// where there is no file of that name, one is taken whose last part is the same in small letters.
+fs::path found(const fs::path& from, std::string name) {
+    if (name.empty()) return {};
+    for (std::size_t i; (i = name.find("\\ ")) != name.npos;) name.erase(i, 1);
+    std::replace(name.begin(), name.end(), '\\', '/');
+    std::error_code ignored;
+    std::set<fs::path> places;
+    for (const fs::path& folder : {from.parent_path(), fs::weakly_canonical(from, ignored).parent_path()}) {
+        if (is_there(folder / name)) return (folder / name).lexically_normal();
+        places.insert({folder, (folder / name).parent_path()});
+    }
+    fs::path best;
+    const std::string last = lower(fs::path(name).filename().string());
+    for (const fs::path& place : places)
+        for (const fs::path& entry : fs::directory_iterator(place.empty() ? "." : place, ignored))
+            if (lower(entry.filename().string()) == last && (best.empty() || entry < best)) best = entry;
+    return best.lexically_normal();
+}
+
+// The path of a picture that a file names, if it is a TGA file, or else of the TGA file of the same stem, or else
+// nothing, with a note. Other kinds are known by their first bytes, whatever the file's name.
+std::string picture(const fs::path& from, const std::string& name, Notes& notes) {
+    std::string tga = fs::path(name).replace_extension(".tga").string(), kind;
+    for (const std::string& each : {name, tga}) {
+        const fs::path path = found(from, each);
+        const std::string other = other_picture_kind(path);
+        if (other.empty() && lower(path.extension().string()) == ".tga") return path.string();
+        if (!path.empty() && kind.empty()) kind = other + ":";
+    }
+    if (kind.empty()) add(notes, {"a picture that is not there, left out", in_quotes(name)});
+    else add(notes, {"a picture that is not TGA, left out; to convert it",
+                     "convert " + in_quotes(kind == ":" ? name : kind + name) + " " + in_quotes(tga)});
+    return "";
+}
+
 // Adds the file's materials to the others; one of the same name is replaced.
 void read_mtl(const fs::path& path, Library& library) {
-    static const std::map<std::string_view, int> maps = {
-        {"map_Kd", diffuse_map}, {"map_Ks", specular_map}, {"map_Ke", glow_map}, {"norm", tangent_map},
-        {"map_Bump", bump_map},  {"map_bump", bump_map},   {"bump", bump_map}};
+    static constexpr std::pair<const char*, int> maps[] = {
+        {"map_kd", diffuse_map}, {"map_ks", specular_map}, {"map_ke", glow_map}, {"norm", tangent_map},
+        {"map_bump", bump_map}, {"bump", bump_map}};
     const FileBytes text = read_text(path);
-    Scanner in(path, text.begin, text.end), in_folder(path.filename(), text.begin, text.end);
     MtlMaterial before_the_first, *material = &before_the_first;
-    const auto note = [&](const std::string& what) {
-        material->notes.push_back(in_folder.place(in.position()) + what);
-    };
-    for (; !in.is_done(); in.next_line()) {
-        const std::string_view word = in.word();
-        if (word == "newmtl") {
+    for (Scanner in(path, text); !in.is_done(); in.next_line()) {
+        const bool is_Ke = in.skip_word("ke");
+        if (is_Ke || in.skip_word("kd")) {
+            vec3 color;
+            const int n = in.reals(color);
+            if (!in.at_end() || (n != 1 && n != 3)) {
+                in.note(material->notes, "a colour that is no number, left out");
+                continue;
+            }
+            for (int i = 0; i < 3; i++)
+                (is_Ke ? material->Ke : material->Kd)[i] = std::clamp(color[n == 1 ? 0 : i], 0., 1.);
+        } else if (in.skip_word("newmtl")) {
             material = &library[in.rest()];
             *material = {};
-        } else if (word == "Kd" && (in.peek_word() == "spectral" || in.peek_word() == "xyz")) {
-            note("Kd " + std::string(in.word()) + " is not known, white is used");
-        } else if (word == "Kd") {
-            vec3& Kd = material->Kd;
-            const int n = in.reals(Kd);
-            if (n != 1 && n != 3) in.fail("Kd needs three numbers, or one");
-            if (n == 1) Kd = {Kd.x, Kd.x, Kd.x};
-            for (int i = 0; i < 3; i++) Kd[i] = std::clamp(Kd[i], 0., 1.);
-        } else if (const auto map = maps.find(word); map != maps.end()) {
-            const std::string name = without_options(in.rest());
-            const fs::path file = beside(path, name);
-            std::string extension = file.extension().string();
-            for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-            if (extension != ".tga") note(in_quotes(name) + " is not a TGA file, left out");
-            else if (!is_there(file)) note(in_quotes(name) + " does not exist, left out");
-            else material->maps[map->second] = file.string();
-        }
+        } else
+            for (const auto& [keyword, map] : maps)
+                if (in.skip_word(keyword)) {
+                    MtlMap& its = material->maps[map] = {};
+                    its.path = picture(path, take_options(in.rest(), its.map), material->notes);
+                }
     }
 }
 
@@ -544,19 +654,16 @@ Library read_libraries(const fs::path& obj, const std::vector<std::string>& line
     Library library{{"", {}}};  // the default material
     std::set<fs::path> seen;
     const auto read = [&](std::string_view name) {
-        const fs::path path = beside(obj, std::string(name));
-        if (name.empty() || !is_there(path)) return false;
+        const fs::path path = found(obj, std::string(name));
+        if (path.empty()) return false;
         if (fs::is_other(path)) throw std::runtime_error(path.string() + ": is not a file");  // a pipe may never end
         if (seen.insert(path).second) read_mtl(path, library);
         return true;
     };
-    for (const std::string& line : lines) {
-        std::string missing;
+    for (const std::string& line : lines)
         for (std::string_view rest = read(line) ? std::string_view() : line; !rest.empty();)
             if (const std::string_view name = take_word(rest); !read(name))
-                missing.append(missing.empty() ? "" : " ").append(name);
-        if (!missing.empty()) notes.push_back("there is no material file " + in_quotes(missing));
-    }
+                add(notes, {"a material file that is not there", in_quotes(name)});
     return library;
 }
 
@@ -565,14 +672,18 @@ Library read_libraries(const fs::path& obj, const std::vector<std::string>& line
 std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, std::vector<Material>& materials,
                                             Notes& notes) {
     std::map<std::string, int> indices;
+    std::set<std::string> unknown;
     std::vector<Model::Group> pieces, groups;
     obj.runs.push_back({obj.nfaces(), ""});
     for (int i = 0; i + 1 < count(obj.runs); i++) {
         auto& [begin, name] = obj.runs[i];
         if (begin == obj.runs[i + 1].face) continue;
-        if (!library.contains(name)) notes.push_back("there is no material " + in_quotes(std::exchange(name, "")));
+        if (!library.contains(name)) {
+            if (unknown.insert(name).second) add(notes, {"a material that no file has", in_quotes(name)});
+            name.clear();
+        }
         const auto [entry, is_new] = indices.emplace(name, count(materials));
-        if (is_new) materials.push_back({name, library.at(name).Kd, {}, {}, {}, {}, {}});
+        if (is_new) materials.push_back({name, library.at(name).Kd, library.at(name).Ke, {}, {}, {}, {}, {}});
         pieces.push_back({begin, obj.runs[i + 1].face, entry->second});
     }
     std::stable_sort(pieces.begin(), pieces.end(), [](auto& a, auto& b) { return a.material < b.material; });
@@ -589,26 +700,31 @@ std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, st
 
 // ---- textures ----
 
-// Adds what a group of faces needs: from the .mtl, and where that names none, the pictures beside the model.
+// Adds what a group of faces needs: from the .mtl, and where that names none, the pictures beside the model or beside
+// what it is a link to.
 void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, const MtlMaterial& mtl,
-                   const std::string& name, NormalMap wanted, Model::Textures& textures, Notes& notes) {
-    std::string maps[map_count];
+                   Material& material, NormalMap wanted, Model::Textures& textures, Notes& notes) {
+    for (const Model::Note& note : mtl.notes) add(notes, note);
+    MtlMap maps[map_count];
     for (int i = 0; i < map_count; i++) {
-        const fs::path picture = fs::path(path).replace_extension() += map_suffixes[i];
-        const bool is_bump = i == tangent_map && mtl.maps[i].empty();
+        const bool is_bump = i == tangent_map && mtl.maps[i].path.empty();
         maps[i] = mtl.maps[is_bump ? bump_map : i];
-        if (maps[i].empty() && is_there(picture)) maps[i] = picture.lexically_normal().string();
+        for (fs::path file : {path, fs::weakly_canonical(path)})
+            if (maps[i].path.empty() && is_there(file.replace_extension() += map_suffixes[i])) {
+                maps[i].path = picture(file, file.filename().string(), notes);
+                break;
+            }
     }
-    if (!maps[normal_map].empty() && !maps[tangent_map].empty())
-        maps[wanted == NormalMap::object ? tangent_map : normal_map].clear();
+    if (!maps[normal_map].path.empty() && !maps[tangent_map].path.empty())
+        maps[wanted == NormalMap::object ? tangent_map : normal_map] = {};
     const bool has_uvs = std::any_of(obj.corners_of(group.begin), obj.corners_of(group.end),
                                      [](const Corner& c) { return c.uv >= 0; });
-    notes.insert(notes.end(), mtl.notes.begin(), mtl.notes.end());
-    for (int i = 0; i < map_count; i++)
-        if (!maps[i].empty() && has_uvs) textures[maps[i]].push_back({group.material, map_members[i]});
-    if (!has_uvs && std::any_of(maps, maps + map_count, [](const std::string& map) { return !map.empty(); }))
-        notes.push_back((name.empty() ? "" : "material " + in_quotes(name) + ": ") +
-                        "no texture coordinates, so no textures");
+    for (int i = 0; i < map_count; i++) {
+        if (maps[i].path.empty()) continue;
+        if (!has_uvs) return add(notes, {"no texture coordinates, so no textures", in_quotes(material.name)});
+        textures[maps[i].path].push_back({group.material, map_members[i]});
+        material.*map_members[i] = maps[i].map;
+    }
 }
 
 }  // namespace
@@ -617,18 +733,19 @@ void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, co
 
 Model::Model(const fs::path& path, NormalMap wanted) {
     Obj obj(path, read_text(path));
+    notes_ = std::move(obj.notes);
     PolygonCutter cutter;
-    int crossed = 0;
-    for (const Obj::Polygon& p : obj.polygons) crossed += !cutter.cut(obj.verts, obj.corners_of(p.face), p.corners);
-    if (crossed > 0)
-        notes_.push_back("polygons that cross themselves or have too many corners: " + std::to_string(crossed));
+    for (const Obj::Polygon& p : obj.polygons)
+        if (!cutter.cut(obj.verts, obj.corners_of(p.face), p.corners))
+            add(notes_, {"a polygon that crosses itself or has very many corners", "of " + std::to_string(p.corners)});
+    given_normals_ = count(obj.normals);
     if (obj.lacks_normals) make_normals(obj);
 
     const Library library = read_libraries(path, obj.libraries, notes_);
     groups_ = group_by_material(obj, library, materials_, notes_);
     for (const Group& g : groups_) {
-        const std::string& name = materials_[g.material].name;
-        plan_textures(path, g, obj, library.at(name), name, wanted, textures_, notes_);
+        Material& material = materials_[g.material];
+        plan_textures(path, g, obj, library.at(material.name), material, wanted, textures_, notes_);
     }
     // A vertex that no face uses may be anywhere. It is put where another is, so that all can be measured and moved.
     std::vector<bool> is_used(obj.verts.size());
@@ -636,6 +753,7 @@ Model::Model(const fs::path& path, NormalMap wanted) {
     for (int i = 0; i < count(obj.verts); i++)
         if (!is_used[i]) obj.verts[i] = obj.verts[obj.corners[0].vert];
     verts_ = std::move(obj.verts);
+    colors_ = std::move(obj.colors);
     normals_ = std::move(obj.normals);
     uvs_ = std::move(obj.uvs);
     corners_ = std::move(obj.corners);
@@ -652,39 +770,21 @@ void Model::load_textures() {
         const auto picture = std::make_shared<const TGAImage>(started.front().get());
         started.pop_front();
         for (const auto& [material, map] : uses)
-            if (picture->bytespp() == 1 && (map == &Material::normal || map == &Material::tangent))
-                notes_.push_back(fs::path(path).filename().string() + " is grey, so no normal map: left out");
-            else materials_[material].*map = picture;
+            if ((map == &Material::normal || map == &Material::tangent) && picture->is_grey())
+                add(notes_, {"a grey picture, heights and no normals, left out", fs::path(path).filename().string()});
+            else (materials_[material].*map).picture = picture;
     }
 }
 
 std::vector<std::string> Model::notes() const {
-    std::vector<std::string> notes;
-    for (const std::string& note : notes_)
-        if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
-    if (notes.size() > 20) {
-        notes[20] = "and " + std::to_string(notes.size() - 20) + " more like these";
-        notes.resize(21);
-    }
-    return notes;
+    std::vector<std::string> lines;
+    for (const auto& [what, first, count] : notes_)
+        lines.push_back(what + ": " + first + (count > 1 ? " and " + std::to_string(count - 1) + " more" : ""));
+    return lines;
 }
 
 void Model::find_box() {
     if (!verts_.empty()) low_ = high_ = verts_[0];
     for (const vec3& v : verts_)
         for (int i = 0; i < 3; i++) low_[i] = std::min(low_[i], v[i]), high_[i] = std::max(high_[i], v[i]);
-}
-
-std::string missing_maps(const std::vector<Model>& models) {
-    constexpr std::pair<const char*, int> kinds[] = {
-        {"diffuse", diffuse_map}, {"normal_map", normal_map}, {"specular", specular_map}, {"glow", glow_map}};
-    std::string names;
-    for (const auto& [name, map] : kinds) {
-        bool used = false;
-        for (const Model& model : models)
-            for (const Material& m : model.materials())
-                used = used || m.*map_members[map] || (map == normal_map && m.tangent);
-        if (!used) names += (names.empty() ? "" : ",") + std::string(name);
-    }
-    return names;
 }

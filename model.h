@@ -13,11 +13,20 @@
 #include <string>
 #include <vector>
 
-// What a surface is made of. Where a map is there the shader uses it; materials may share one. No normal map is grey.
-using Map = std::shared_ptr<const TGAImage>;
+// A picture on a surface, if there is one; several may share it. It is looked up at uv * scale + offset.
+struct Map {
+    std::shared_ptr<const TGAImage> picture;
+    vec2 scale{1, 1}, offset;
+    bool is_moved = false;  // whether they are others than these
+    explicit operator bool() const { return picture != nullptr; }
+    const TGAImage* operator->() const { return picture.get(); }
+};
+
+// What a surface is made of. Where a map is there the shader uses it. No normal map is grey.
 struct Material {
     std::string name;
     vec3 Kd{1, 1, 1};  // diffuse reflectance, red green blue in [0,1]; it multiplies the diffuse texel
+    vec3 Ke;           // glow, red green blue in [0,1], where there is no map of it
     Map diffuse;       // NAME_diffuse.tga or map_Kd
     Map normal;        // NAME_nm.tga: object space, (r,g,b) = (x,y,z) from [0,255] to [-1,1]
     Map tangent;       // NAME_nm_tangent.tga, norm or map_Bump: tangent space
@@ -36,6 +45,10 @@ public:
     };
     struct Group {  // the faces [begin,end) share a material
         int begin, end, material;
+    };
+    struct Note {  // of a kind of thing: the first one, and how many there are
+        std::string what, first;
+        int count = 1;
     };
     // By path, and of each of the materials that use it: its index, and which map the picture is.
     using Textures = std::map<std::string, std::vector<std::pair<int, Map Material::*>>>;
@@ -58,7 +71,7 @@ public:
         find_box();
     }
 
-    // What the user may want to know and is no error, one line each without the file's name at its head.
+    // What the user may want to know and is no error: a line for each kind of thing, without the file's name before it.
     std::vector<std::string> notes() const;
 
     int nverts() const { return static_cast<int>(verts_.size()); }
@@ -68,6 +81,12 @@ public:
     const vec3& vert(int i) const { return verts_[i]; }
     const vec3& vert(int face, int c) const { return verts_[corner(face, c).vert]; }
     const vec3& normal(int face, int c) const { return normals_[corner(face, c).normal]; }  // unit
+    // Whether the file gives none to some corner: then who knows which side of the face is its front?
+    bool has_made_normals(int face) const {
+        return std::max({corner(face, 0).normal, corner(face, 1).normal, corner(face, 2).normal}) >= given_normals_;
+    }
+    bool has_colors() const { return !colors_.empty(); }
+    const vec3& color(int face, int c) const { return colors_[corner(face, c).vert]; }  // red green blue in [0,1]
     vec2 uv(int face, int c) const {  // (0,0) where the file gives none; v points up
         const int i = corner(face, c).uv;
         return i < 0 ? vec2{} : uvs_[i];
@@ -94,15 +113,13 @@ public:
 private:
     void find_box();
 
-    std::vector<vec3> verts_, normals_;
+    std::vector<vec3> verts_, normals_, colors_;
+    int given_normals_ = INT32_MAX;  // behind these come made ones
     vec3 low_, high_;
     std::vector<vec2> uvs_;
     std::vector<Corner> corners_;  // three a face
     std::vector<Material> materials_;
     std::vector<Group> groups_;
     Textures textures_;
-    std::vector<std::string> notes_;
+    std::vector<Note> notes_;
 };
-
-// The names of the kinds of map that no material of any model has, with commas between them.
-std::string missing_maps(const std::vector<Model>& models);

@@ -449,6 +449,7 @@ INLINED bool bound(const Point* corners, int n, int width, int height, Coverage&
 // (xmin, ymin) of the face, which keeps the products small.
 struct Barycentric {
     vec3 ex, ey, e0;
+    bool front_facing;
 };
 
 // Also completes c by the depth, sum(z_i e_i) / sum(w_i e_i): the denominator is |det| everywhere.
@@ -466,11 +467,11 @@ INLINED Barycentric planes(Screen& s, Coverage& c) {
     if (det == 0 || !std::isfinite(det)) {
         // Seen exactly edge-on, yet snapped to a sliver: its neighbours leave those samples to it. It shows corner 0.
         c.zx = c.zy = 0, c.z0 = c.zmax;
-        return {{}, {}, {1, 0, 0}};
+        return {{}, {}, {1, 0, 0}, true};
     }
     if (det < 0)
         for (vec3& f : e) f = -f;
-    const Barycentric b{{e[0].x, e[1].x, e[2].x}, {e[0].y, e[1].y, e[2].y}, {e[0].z, e[1].z, e[2].z}};
+    const Barycentric b{{e[0].x, e[1].x, e[2].x}, {e[0].y, e[1].y, e[2].y}, {e[0].z, e[1].z, e[2].z}, det > 0};
     // Depths are taken relative to that of the corner farthest in front of the eye, so that a small slope is not the
     // difference of large numbers.
     const int r = p[0].w >= p[1].w ? (p[0].w >= p[2].w ? 0 : 2) : (p[1].w >= p[2].w ? 1 : 2);
@@ -797,7 +798,7 @@ struct Pass {
         const coord x = to_coord(pack<std::int32_t>::load(xs)), y = to_coord(pack<std::int32_t>::load(ys));
         const coord dx = x - face.xmin, dy = y - face.ymin;
         Fragment f;
-        f.face = face.iface;
+        f.face = face.iface, f.front_facing = b.front_facing;
         f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
         // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
         for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);

@@ -57,9 +57,9 @@ struct Models : std::vector<const Model*> {
 };
 
 // Makes a scene fill the picture, all models by one transform: the centre of their box comes to the origin, and they
-// are as large as the middle three quarters hold every vertex, seen from eye. A scene is left alone, and the result false,
-// where from there every vertex falls into a square picture, the box's largest half side is at least 1/2 and its centre
-// is within 1/2 of the origin.
+// are as large as the middle three quarters hold every vertex, seen from eye. A scene is left alone, and the result
+// false, where from there every vertex falls into a square picture, the box's largest half side is at least 1/2 and its
+// centre is within 1/2 of the origin.
 bool fit(std::vector<Model>& scene, const vec3& eye = {1, 1, 4});
 
 // An orthographic camera, fitted: its projection and viewport are replaced so that the models fill all of size x size
@@ -118,6 +118,7 @@ TGAImage depth_picture(const DepthBuffer& depths);
 struct Fragment {
     int face;              // of the model
     vec<3, coord> screen;  // the pixel's centre and the depth there
+    bool front_facing;     // seen from where its corners run counterclockwise
     vec<3, coord> bar;     // barycentric coordinates on the face itself (perspective undone): each >= 0, their sum is 1
 };
 
@@ -144,29 +145,32 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
         [&](int i) { return varying[0][i] * bar.x + varying[1][i] * bar.y + varying[2][i] * bar.z; });
 }
 
-// Texture coordinates of any size, wrapped round to [0,1]: rounding may give 1 itself. 0 where one is beyond the range
-// of a double.
-INLINED vec<2, coord> wrapped(const vec<2, coord>& uv) {
-    return componentwise<2, coord>([&](int i) {
+// Texture coordinates of any size, and wrapped round to [0,1]: rounding may give 1 itself. 0 where one is beyond the
+// range of a double.
+struct UV {
+    vec<2, coord> given, wrapped;
+    INLINED UV(const vec<2, coord>& uv) : given(uv), wrapped(componentwise<2, coord>([&](int i) {
         const coord f = uv[i] - floor(uv[i]);
         return select(f == f, f, 0);
-    });
-}
+    })) {}
+};
 
-// The texels (floor(u*w), floor(v*h)) of a picture, one a lane: the nearest. uv in [0,1]. [i] is their channel i.
+// The texels (floor(u*w), floor(v*h)) of a map's picture, one a lane: the nearest. [i] is their channel i.
 class Texels {
 public:
-    INLINED Texels(const TGAImage& map, const vec<2, coord>& uv) {
-        const int w = map.width(), h = map.height();
+    INLINED Texels(const Map& map, const UV& at) {
+        const vec<2, coord> uv = map.is_moved ? UV({at.given.x * map.scale.x + map.offset.x,
+                                                      at.given.y * map.scale.y + map.offset.y}).wrapped : at.wrapped;
+        const int w = map->width(), h = map->height();
         const pack<std::int32_t> x = min(to_int(uv.x * w), w - 1), y = min(to_int(uv.y * h), h - 1);
         std::uint32_t index[lanes];  // a picture may have up to 2^32 pixels
         (converted<std::uint32_t>(y) * w + converted<std::uint32_t>(x)).store(index);
-        const std::uint8_t* const first = map.pixel(0, 0);
+        const std::uint8_t* const first = map->pixel(0, 0);
         std::int32_t bytes[lanes];
         for (int i = 0; i < lanes; i++)
-            std::memcpy(&bytes[i], first + std::size_t{index[i]} * map.bytespp(), 4);
+            std::memcpy(&bytes[i], first + std::size_t{index[i]} * map->bytespp(), 4);
         bytes_ = pack<std::int32_t>(bytes);
-        if (map.bytespp() == 1) bytes_.p[0] = (bytes_.p[0] & 255) * 0x10101;  // grey
+        if (map->bytespp() == 1) bytes_.p[0] = (bytes_.p[0] & 255) * 0x10101;  // grey
     }
     INLINED real operator[](int channel) const {
         pack<std::int32_t> value;

@@ -8,10 +8,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #if __has_include(<sys/mman.h>)
 #include <sys/mman.h>
@@ -40,7 +42,7 @@ FileBytes read_file(const fs::path& path, std::size_t beyond) {
     const auto fail = [&](const std::string& what) { throw std::runtime_error(path.string() + ": " + what); };
     std::error_code unknown;
     if (fs::is_directory(path, unknown)) fail("is a directory");
-    const Stream file = open(path, "rb");
+    const Stream file = path == "-" ? Stream(stdin, [](std::FILE*) { return 0; }) : open(path, "rb");
     if (!file) fail("cannot be opened: " + reason());
 #ifdef MAP_PRIVATE
     // A mapping costs neither a copy nor fresh memory: a quarter of the loading time. What lies beyond the file on its
@@ -59,6 +61,17 @@ FileBytes read_file(const fs::path& path, std::size_t beyond) {
     if (std::ferror(file.get())) fail("cannot be read: " + reason());
     bytes->resize(bytes->size() + beyond);
     return {bytes, bytes->data(), bytes->data() + bytes->size() - beyond};
+}
+
+std::string other_picture_kind(const fs::path& path) {
+    static constexpr std::pair<std::string_view, const char*> kinds[] = {
+        {"\x89PNG", "png"}, {"\xFF\xD8\xFF", "jpeg"}, {"GIF8", "gif"}, {"BM", "bmp"}, {"RIFF", "webp"}, {"DDS ", "dds"},
+        {"II*", "tiff"}, {"MM", "tiff"}, {"8BPS", "psd"}, {"v/1\1", "exr"}, {"#?RA", "hdr"}};
+    char bytes[4] = {};
+    std::ifstream(path, std::ios::binary).read(bytes, sizeof bytes);
+    for (const auto& [first, kind] : kinds)
+        if (std::string_view(bytes, sizeof bytes).starts_with(first)) return kind;
+    return "";
 }
 
 void FileBytes::forget_before([[maybe_unused]] const char* place) const {
@@ -233,6 +246,12 @@ TGAImage::TGAImage(int width, int height, Format format) : w_(width), h_(height)
     if (width < 1 || width > 65535 || height < 1 || height > 65535)
         throw std::invalid_argument("a picture of " + size_in_words(width, height) + ": a side has 1 to 65535");
     data_.resize(std::size_t{1} * w_ * h_ * bpp_ + 3);
+}
+
+bool TGAImage::is_grey() const {
+    for (const Byte* p = data_.data(); bpp_ > 1 && p < data_.data() + std::size_t{1} * w_ * h_ * bpp_; p += bpp_)
+        if (p[0] != p[1] || p[1] != p[2]) return false;
+    return true;
 }
 
 TGAImage TGAImage::read_tga_file(const fs::path& path) {

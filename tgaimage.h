@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct FileBytes {
 // Its bytes and those BEYOND its end may be written to, which stays in memory. Where the system can, the file is mapped
 // and must not become shorter while it is used. Throws std::runtime_error "FILE: what", also for 4 GiB or more.
 FileBytes read_file(const std::filesystem::path& path, std::size_t beyond);
+
+// "png", "jpeg" and so on where a file is such a picture, by its first bytes; else nothing.
+std::string other_picture_kind(const std::filesystem::path& path);
 
 struct TGAColor {
     std::uint8_t bgra[4] = {0, 0, 0, 0};
@@ -52,6 +56,8 @@ public:
     int height() const { return h_; }
     int bytespp() const { return bpp_; }
     bool empty() const { return data_.empty(); }
+
+    bool is_grey() const;  // blue, green and red are the same at each pixel
 
     // Outside the picture get() is all zeros and set() does nothing.
     TGAColor get(int x, int y) const {

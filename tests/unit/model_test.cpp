@@ -174,7 +174,9 @@ TEST("line ends, tabs, blanks, comments, continued lines, a byte order mark, wor
         {square + "f 1 2 3\r", "0 1 2"},
         {"\n\n\r\n \t\n" + square + "\n\n\nf 1 2 3\n\n", "0 1 2"},
         {"o head\ng a b c\ns 1\ns off\n" + square + "vp 1 2 3\nl 1 2\np 1\ncstype bezier\nverse 1 2\nfoo\n"
-         "V 1 2 3\nF 1 2 3\nvt\xC3\xA9 x\n\x01\x02\nf 1 2 3\nend\n", "0 1 2"},
+         "vv 1 2 3\nff 1 2 3\nvt\xC3\xA9 x\n\x01\x02\nf 1 2 3\nend\n", "0 1 2"},
+        {"V 0 0 0\nV 1 0 0\nv 1 1 0\nVT 0 0\nVn 0 0 1\nF 1/1 2//1 3\n", "0/0 1 2"},
+        {"v 0 0 0\rv 1 0 0\r# a comment\rv 1 1 0\r\rf 1 2 \\\r3\rf 3 2 1", "0 1 2, 2 1 0"},
         {square + "#" + std::string(1500000, 'x') + "\nf 1 2" + blanks + "3\n", "0 1 2"},
         {square + "curv " + std::string(3000000, '1') + "\nf 1 2 3\n", "0 1 2"},
         {continued + "4", "0 1 2, 0 2 3"},
@@ -184,7 +186,7 @@ TEST("line ends, tabs, blanks, comments, continued lines, a byte order mark, wor
         {"v 0 0 \\\n 0\nv 1 0 0\nv x 1 1\n", "4: 'x' is no finite number"},
         {"v 0 0 \\\n 0\nv 1 \\\n y 0\n", "4: 'y' is no finite number"},
         {"o a \\\n b \\\n c\nf 1 2 0\n", "4: vertex index 0"},
-        {square + "f 1 \\\n 2\n", "6: a face needs three corners, this one has 2"},
+        {"v 0 0 0\rv 1 0\rf 1 1 1\r", "2: a vertex needs three coordinates"},
         {square + "f 1 \\2 3\n", "5:"},
         {"\xEF\xBB\xBF\n\nf 0 1 1", "3:"},
         {square + "f 1 2" + blanks + "0\n", "5: vertex index 0"},
@@ -208,7 +210,16 @@ TEST("a file without a face, a missing file, a folder, a device and a binary fil
     std::string utf16;
     for (const char c : square) utf16 += {c, '\0'};
     for (const std::string& obj : {utf16, square + "f 1 2 3\n" + std::string(1, '\0')})
-        check_errors({{obj, " is a binary file, not text"}});
+        check_errors({{obj, " is a binary file, not a text of vertices and faces"}});
+    const std::string header(80, 'x'), face(50, '\1');
+    for (const auto& [bytes, kind] : std::vector<std::pair<std::string, std::string>>{
+             {"solid cube\nfacet normal 0 0 1\n", "STL"}, {header + std::string("\1\0\0\0", 4) + face, "STL"},
+             {"ply\nformat ascii 1.0\n", "PLY"}, {"glTF\2", "glTF"}, {"{\"asset\": {}}", "glTF or JSON"},
+             {"<!DOCTYPE html>", "HTML or XML"}, {"\x1F\x8B\x08", "gzip"}, {"PK\3\4", "ZIP"},
+             {"\xFF\xFEv", "UTF-16"}, {"\xFE\xFF\1v", "UTF-16"}, {"Kaydara FBX Binary", "FBX"}, 
+             {"BLENDER-v2", "Blender"},
+             {"version https://git-lfs.github.com/spec/v1\n", "Git LFS pointer ('git lfs pull')"}})
+        check_errors({{bytes, " is a " + kind + " file, not a text of vertices and faces"}});
     const Folder folder;
     CHECK_THROWS(Model(folder / "none.obj"), "none.obj: cannot be opened: ");
     fs::create_directory(folder / "folder.obj");
@@ -249,8 +260,7 @@ TEST("what is no finite number or no index, is missing or out of range is an err
          {"nan", "-nan", "NaN", "inf", "+inf", "-Infinity", "1e999", "-1e309", "1e99999999999999999999", "nan(7)",
           "179769313486231570000000000000e280", "1x", "1.2.3", "1e", "1e+", "1-2", "0x10", "1,5", "1_0", "1/2", "1\\2",
           "x", ".", "-", "+", "+-1", "-+1", "--1", "e5", ",5", "one", "\\1", "/"})
-        for (const std::string& line : {"v 0 " + bad + " 0", "vt " + bad + " 0", "vn 0 0 " + bad, "v 0 0 0 " + bad})
-            check_errors({{"\n" + line + "\n", "2: '" + bad + "' is no finite number"}});
+        check_errors({{"\nv 0 " + bad + " 0\n", "2: '" + bad + "' is no finite number"}});
     for (const std::string bad : {"1x", "1/1x", "1//1x", "1/1/1/1", "1.0", "1/1/1x", "1e0"})
         check_errors({{full_square + "f 1 2 " + bad + "\n", "11: garbage after a number: '"}});
     for (const std::string bad : {"x", "/1", "//1", "-", "+", "--1", "nan", "2147483648", "4294967297", "-2147483648",
@@ -265,24 +275,44 @@ TEST("what is no finite number or no index, is missing or out of range is an err
         {full_square + "f 1 2/x 3\n", "11: 'x' is no texture index"},
         {full_square + "f 1 2/- 3\n", "11: '-' is no texture index"},
         {full_square + "f 1 2//x 3\n", "11: 'x' is no normal index"},
-        {"vn 1 2\n", "1: a normal needs three coordinates"},
-        {"vt\n", "1: a texture coordinate needs a number"},
-        {square + "f\n", "5: a face needs three corners, this one has 0"},
-        {square + "f 1 2\n", "5: a face needs three corners, this one has 2"},
-        {square + "f 1 2 # 3\n", "5: a face needs three corners, this one has 2"},
-        {square + "f 1 2 0\n", "5: vertex index 0 (indices count from 1)"},
-        {full_square + "f 1 2 3/0\n", "11: texture index 0 (indices count from 1)"},
-        {full_square + "f 1 2 3//-0\n", "11: normal index 0 (indices count from 1)"},
-        {square + "vt 0 0\nvt 1 0\nvn 0 0 1\nf 1//2 2 3\n", "8: normal index 2, but the file has only 1"},
-        {square + "vt 0 0\nvn 0 0 1\nvn 1 0 0\nf 1/2 2 3\n", "8: texture index 2, but the file has only 1"},
-        {square + "f 1 2 5\n\nf 1 2 3\n", "5: vertex index 5, but the file has only 4"},
-        {square + "f 1 2 3\nf 1/1 2 3\n", "6: texture index 1, but the file has only 0"},
-        {full_square + "f 1//4 2 3\n", "11: normal index 4, but the file has only 3"},
-        {"f 1 2 3\n\nf 1 2 5\nf 9 9 9\n" + square, "3: vertex index 5, but the file has only 4"},
-        {square + "f 1 2 -5\nv 0 0 0\n", "5: vertex index -5, but only 4 are defined so far"},
-        {square + "f 1/-1 2 3\n", "5: texture index -1, but only 0 are defined so far"},
-        {square + "f 1 2 2147483647\n", "5: vertex index 2147483647, but the file has only 4"},
+        {square + "f 1 2 0\n", "5: vertex index 0: 4 are defined, counted from 1"},
+        {square + "f 1 2 5\n\nf 1 2 3\n", "5: vertex index 5: 4 are defined, counted from 1"},
+        {"f 1 2 3\n\nf 1/1 2 5/7\nf 9 9 9\n" + square, "3: vertex index 5: 4 are defined, counted from 1"},
+        {square + "f 1 2 -5//2\nv 0 0 0\n", "5: vertex index -5: 4 are defined, counted from 1"},
+        {square + "f 1 2 2147483647\n", "5: vertex index 2147483647: 4 are defined, counted from 1"},
     });
+}
+
+TEST("what costs no geometry is a note: corners too few, indices of no normal or texture, words that are no numbers") {
+    const std::string number = "a normal or texture coordinate that is no number, left out: m.obj:",
+                      color = "a colour that is no number, left out: m.obj:",
+                      index = "an index of a normal or texture coordinate that is not there, left out: face ",
+                      corners = "a face of fewer than three corners, left out: m.obj:";
+    struct Noted {
+        std::string obj, expected, note;
+    };
+    for (const auto& [obj, expected, noted] : std::vector<Noted>{
+             {square + "f\nf 1 2 # 3\nf 1 2 3\nf 4\n", "0 1 2", corners + "5 and 2 more"},
+             {square + "f 1 \\\n 2\nf 1 2 3", "0 1 2", corners + "6"},
+             {square + "f 1//1 2 3\n", "0 1 2", index + "1"},
+             {square + "f 1 2 3\nf 1/1 2/-1 3/1\n", "0 1 2, 0 1 2", index + "2 and 2 more"},
+             {full_square + "f 1/4 2/-4 3/3\nf 1/0 2//-0 3//4\n", "0 1 2/2, 0 1 2", index + "1 and 4 more"},
+             {square + "f 1/2 2/1 3\nvt 0 0\nf 1//2 2//1 3\nvn 0 0 1\n", "0 1/0 2, 0 1 2", index + "1 and 1 more"},
+             {square + "vn 1 2\nvt\nvn 0 nan 1\nvt 1e999\nf 1/1/1 2//2 3/2\n", "0/0 1 2/1", number + "5 and 3 more"},
+             {"v 0 0 0 1 x\nv 1 0 0 nan\nv 1 1 0\nf 1 2 3\n", "0 1 2", color + "1 and 1 more"}}) {
+        const Model m = load(obj);
+        CHECK_EQ(faces(m), expected);
+        CHECK_EQ(notes(m), noted + "\n");
+        CHECK_EQ(normals(m), upright);
+    }
+}
+
+TEST("colours of vertices; whoever has none is white, and a weight is no colour") {
+    const Model m = load("v 0 0 0\nv 1 0 0 .5 .25 0\nv 1 1 0 2 -1 1 9\nv 0 1 0 9 .5 -1\nf 1 2 3\nf 1 2 4\n");
+    CHECK(m.has_colors());
+    CHECK_EQ(vertices({m.color(0, 0), m.color(0, 1), m.color(0, 2), m.color(1, 2)}),
+             "v 1 1 1\nv 0.5 0.25 0\nv 1 1 1\nv 1 0.5 0\n");
+    CHECK(!load(square + "v 1 2 3 4\nv 1 2 3 4 5\nf 1 2 3\n").has_colors());
 }
 
 // ---- polygons ----
@@ -426,7 +456,7 @@ TEST("polygons without area, that cross themselves or have many corners have two
     for (const Polygon& p : {star, comb(1000), comb(100000)}) {  // the combs become fans, that cover more than them
         const Model m = load(in_plane(p));
         CHECK_EQ(m.nfaces(), static_cast<int>(p.size()) - 2);
-        CHECK_EQ(notes(m), "polygons that cross themselves or have too many corners: 1\n");
+        CHECK_EQ(notes(m).substr(0, 51), "a polygon that crosses itself or has very many corn");
     }
 }
 
@@ -457,9 +487,10 @@ constexpr double few_roundings = 16 * std::numeric_limits<double>::epsilon();
 
 TEST("made normals are weighted by angle, so they depend neither on how a cube's sides are cut nor on the scale") {
     const std::string sides = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
-    std::vector<std::string> cubes = {cube() + "f 1 3 4\nf 1 4 2\nf 6 8 7\nf 6 7 5\nf 1 2 6\nf 1 6 5\nf 3 7 8\n"
+    std::vector<std::string> cubes = {cube() + "s 1\nf 1 3 4\nf 1 4 2\nf 6 8 7\nf 6 7 5\nf 1 2 6\nf 1 6 5\nf 3 7 8\n"
                                                "f 3 8 4\nf 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n"};
-    for (const double scale : {1., 1e-30, 1e38, 1e300, 1e-300, 1e308, 1e-320}) cubes.push_back(cube(scale) + sides);
+    for (const double scale : {1., 1e-30, 1e38, 1e300, 1e-300, 1e308, 1e-320})
+        cubes.push_back(cube(scale) + "s 1\n" + sides);
     for (const std::string& obj : cubes) {
         const Model m = load(obj);
         for (int i = 0; i < 3 * 12; i++) {
@@ -468,10 +499,50 @@ TEST("made normals are weighted by angle, so they depend neither on how a cube's
         }
     }
     // Around (0,0,0): 90 degrees of the plane z = 0, 45 of the plane y = 0 seen from -y.
-    const vec3 slanted = load("v 0 0 0\nv 1 0 0\nv 0 5 0\nv 7 0 7\nf 1 2 3\nf 1 2 4\n").normal(0, 0);
+    const vec3 slanted = load("v 0 0 0\nv 1 0 0\nv 0 5 0\nv 7 0 7\ns 1\nf 1 2 3\nf 1 2 4\n").normal(0, 0);
     CHECK_NEAR(norm(slanted - normalized(vec3{0, -1, 2})), 0, few_roundings);
     CHECK_EQ(normals(load("v -1.7e308 -1.7e308 1e308\nv 1.7e308 -1.7e308 1e308\nv 0 1.7e308 1e308\nf 1 2 3")), upright);
     CHECK_EQ(normals(load("v 0 0 0\nv 1 0 0\nv 1 1e-200 0\nf 1 2 3\n")), upright);
+}
+
+// The sides of a column: four corners each. Bottom and top are left open.
+std::string column(int n, const std::string& line = "") {
+    std::string obj;
+    for (int i = 0; i < n; i++) {
+        const double a = 2 * 3.14159265 / n * i;
+        obj += vertices({{std::cos(a), std::sin(a), 0}, {std::cos(a), std::sin(a), 1}});
+    }
+    for (int i = 0; i < n; i++) {
+        const std::string a = std::to_string(2 * i + 1), b = std::to_string(2 * i + 2),
+                          c = std::to_string(2 * ((i + 1) % n) + 1), d = std::to_string(2 * ((i + 1) % n) + 2);
+        obj += (i % 2 ? "" : line) + "f " + a + " " + c + " " + d + " " + b + "\n";
+    }
+    return obj;
+}
+bool is_smooth(const Model& m, int face = 0) {  // at the face's first corner
+    return norm(m.normal(face, 0) - normalized(cross(m.vert(face, 1) - m.vert(face, 0),
+                                                      m.vert(face, 2) - m.vert(face, 0)))) > .1;
+}
+
+TEST("without normals edges of up to 60 degrees are smooth; groups say it themselves; off, 0 and null are facets") {
+    for (const int n : {3, 4, 5, 6, 7, 20}) {
+        CHECK_EQ(is_smooth(load(column(n))), n >= 6);
+        CHECK(is_smooth(load(column(n, "s 1\n"))));
+        CHECK(is_smooth(load("S 7 \\\n # group\n" + column(n))));
+        for (const std::string off : {"s off\n", "s 0\n", "s null\n", "s\n"}) CHECK(!is_smooth(load(off + column(n))));
+    }
+    // Groups of two sides each: at the first corner of an even face another group ends.
+    std::string pairs = column(8);
+    for (std::size_t at = 0, i = 0; (at = pairs.find("f ", at)) != pairs.npos; at += 6, i++)
+        pairs.insert(at, "s " + std::to_string(i / 2 + 1) + "\n");
+    for (int face = 0; face < 16; face++) CHECK_EQ(is_smooth(load(pairs), face), face / 2 % 2 == 1);
+    // Where faces touch at a vertex alone each has its own normal.
+    const std::string roofs = "v 0 0 0\nv 1 0 .5\nv 0 1 .5\nv -1 0 .5\nv 0 -1 .5\n";
+    const Model touching = load(roofs + "f 1 2 3\nf 1 4 5\n");
+    CHECK(!is_smooth(touching, 0) && !is_smooth(touching, 1));
+    CHECK(is_smooth(load(roofs + "f 1 2 3\nf 1 3 4\n")));
+    // A face without area between two others separates nothing.
+    CHECK_EQ(normals(load(roofs + "f 1 2 3\nf 1 3 3\nf 1 3 4\n")), normals(load(roofs + "f 1 2 3\nf 1 3 4\n")));
 }
 
 TEST("normals of faces without area, of faces that cancel each other, and given ones") {
@@ -535,35 +606,38 @@ TEST("faces are grouped by material, in the order of their first faces; an unkno
     const Model mixed = folder.load(square + "f 1 2 3\nusemtl green\nf 2 3 4\nusemtl red\nf 3 4 1\nusemtl pink\n"
                                              "f 4 1 2\nusemtl green\nf 1 2 4\nmtllib m.mtl\n");
     CHECK_EQ(faces(mixed), "0 1 2, 1 2 3, 3 0 1, 0 1 3, 2 3 0");
-    CHECK_EQ(materials(mixed), " 1 1 1; red 0.5 0.5 0.5; there is no material 'green'\nthere is no material 'pink'\n");
+    CHECK_EQ(materials(mixed), " 1 1 1; red 0.5 0.5 0.5; a material that no file has: 'green' and 1 more\n");
 }
 
-TEST("a missing .mtl is a note, a bad one an error; mtllib lines have a name with blanks, or several names; notes") {
+TEST("a missing .mtl and a colour that is none are notes; mtllib lines have a name with blanks, or several names") {
     const Folder folder;
     const std::string face = square + "f 1 2 3\n";
-    CHECK_EQ(materials(load("mtllib none.mtl\n" + face)), " 1 1 1; there is no material file 'none.mtl'\n");
-    for (const std::string bad : {"Kd 1 x 0", "Kd nan", "Kd 1 2", "Kd", "Kd 1e999 0 0", "Kd 1 1 1y", "Kd spectre"})
-        CHECK_THROWS(folder.load(face, "# a comment\r\nnewmtl a\r\n\r\n" + bad + "\r\n"), "m.mtl:4: ");
-    CHECK_THROWS(folder.load(face, std::string("newmtl a\0", 9)), "m.mtl: is a binary file, not text");
-    const std::string mtl = "\xEF\xBB\xBF" "Kd 1 1 1\nnewmtl a\nKd xyz 1 1 1\nNs 10\nillum 2";
-    CHECK_EQ(materials(folder.load("usemtl a\n" + face, mtl)),
-             "a 1 1 1; m.mtl:3: Kd xyz is not known, white is used\n");
+    CHECK_EQ(materials(load("mtllib none.mtl\nmtllib gone.mtl lost.mtl\n" + face)),
+             " 1 1 1; a material file that is not there: 'none.mtl' and 2 more\n");
+    for (const std::string bad : {"Kd 1 x 0", "Kd nan", "Kd 1 2", "Kd", "Kd 1e999 0 0", "Kd 1 1 1y",
+                                  "Kd spectral a.rfl", "Kd xyz 1 1 1", "Ke 1 1 x"})
+        CHECK_EQ(materials(folder.load("usemtl a\n" + face, "# a comment\r\nnewmtl a\r\n\r\n" + bad + "\r\n")),
+                 "a 1 1 1; a colour that is no number, left out: m.mtl:4\n");
+    CHECK_THROWS(folder.load(face, std::string("newmtl a\0", 9)), "m.mtl: is a binary file");
+    CHECK_THROWS(folder.load(face, "<html>"), "m.mtl: is a HTML or XML file");
+    const std::string mtl = "\xEF\xBB\xBF" "Kd 1 1 1\nNEWMTL a\nKE .25 2 0\nkD 1\nKD .5\nNs 10\nillum 2";
+    const Model glowing = folder.load("usemtl a\n" + face, mtl);
+    CHECK_EQ(materials(glowing), "a 0.5 0.5 0.5; ");
+    CHECK(glowing.materials()[0].Ke == (vec3{.25, 1, 0}));
 
     fs::create_directory(folder / "sub");
     folder.write("my own.mtl", "newmtl my own # colour\nKd .25\n");
     folder.write("sub/b.mtl", "newmtl b\nKd 2 -1 .5\n");  // a reflectance is in [0,1]
-    CHECK_EQ(materials(folder.load(square + "mtllib \\\n my own.mtl \\\r\n \\\n\r\nmtllib sub\\b.mtl c.mtl\n"
-                                            "usemtl my own # colour \nf 1 2 3\nusemtl b\nf 1 2 3\n")),
-             "my own # colour 0.25 0.25 0.25; b 1 0 0.5; there is no material file 'c.mtl'\n");
+    for (const std::string own : {"my own.mtl", "my\\ own.mtl", "C:\\models\\My Own.MTL", "/no/such/folder/my own.mtl"})
+        CHECK_EQ(materials(folder.load(square + "mtllib \\\n " + own + " \\\r\n \\\n\r\nmtllib sub\\b.mtl c.mtl\n"
+                                                "usemtl my own # colour \nf 1 2 3\nusemtl b\nf 1 2 3\n")),
+                 "my own # colour 0.25 0.25 0.25; b 1 0 0.5; a material file that is not there: 'c.mtl'\n");
 
-    // Notes are limited in number and length, and fit on a line each.
+    // A note has a line, whatever a name is made of, and there is one for each kind of thing.
     std::string obj = square;
     for (int i = 0; i < 100; i++)
         obj += "usemtl " + std::string(1000, 'x') + "\x1B\n" + "usemtl \x1B" + std::to_string(i) + "\nf 1 2 3\n";
-    const Model m = load(obj);
-    CHECK_EQ(m.notes().size(), 21u);
-    CHECK_EQ(m.notes()[0], "there is no material '?0'");
-    CHECK_EQ(m.notes().back(), "and 80 more like these");
+    CHECK_EQ(notes(load(obj)), "a material that no file has: '?0' and 99 more\n");
     CHECK(notes(load(square + "usemtl " + std::string(100000, 'x') + "\nf 1 2 3\n")).size() < 100);
 }
 
@@ -607,13 +681,24 @@ TEST("textures beside the model are found by their suffix, and may be absent; on
 TEST("faces without texture coordinates have no textures; grey pictures are no normal maps") {
     const Folder folder;
     folder.write("m_diffuse.tga", "no picture");  // is not even decoded
-    CHECK_EQ(maps(folder.load(full_square + "f 1 2 3\n")), "-1 -1 -1 -1 -1; no texture coordinates, so no textures\n");
+    CHECK_EQ(maps(folder.load(full_square + "f 1 2 3\n")), 
+             "-1 -1 -1 -1 -1; no texture coordinates, so no textures: ''\n");
     for (const char* name : suffixes) folder.picture(name, 77, TGAImage::GRAYSCALE);
     const Model m = folder.load(full_square + "usemtl a\nf 1 2 3/1\nusemtl b\nf 1 2 3\n",
                                 "newmtl a\nnewmtl b\nmap_Kd m_diffuse.tga\n");
-    CHECK_EQ(maps(m), "77 -1 -1 77 77; -1 -1 -1 -1 -1; material 'b': no texture coordinates, so no textures\n"
-                      "m_nm.tga is grey, so no normal map: left out\n");
+    CHECK_EQ(maps(m), "77 -1 -1 77 77; -1 -1 -1 -1 -1; no texture coordinates, so no textures: 'b'\n"
+                      "a grey picture, heights and no normals, left out: m_nm.tga\n");
     CHECK_EQ(m.materials()[0].diffuse->bytespp(), 1);
+    // Heights are often stored in three channels.
+    TGAImage heights(2, 2, TGAImage::RGB);
+    for (const int blue : {5, 6}) {
+        for (int i = 0; i < 4; i++) heights.set(i % 2, i / 2, {{static_cast<std::uint8_t>(i < 3 ? 5 : blue), 5, 5, 0}});
+        heights.write_tga_file(folder / "h.tga");
+        const std::string grey = "77 -1 -1 77 77; a grey picture, heights and no normals, left out: h.tga\n";
+        fs::remove(folder / "m_nm.tga"), fs::remove(folder / "m_nm_tangent.tga");
+        CHECK_EQ(maps(folder.load("usemtl a\n" + textured, "newmtl a\nmap_Bump h.tga\n")),
+                 blue == 5 ? grey : "77 -1 5 77 77; ");
+    }
 }
 
 TEST("the maps of an .mtl, relative to it, before those by suffix") {
@@ -628,7 +713,7 @@ TEST("the maps of an .mtl, relative to it, before those by suffix") {
                  "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ks s.TGA\nnorm -bm 0.5 n.tga\n"
                  "map_Bump -bm 1 bump.tga\nmap_Ke -mm 0 1 -blendu off -type sphere -imfchan l e.tga \r\n"
                  "newmtl part\n  map_Kd\tmy maps/a b.tga\nnewmtl none\nmap_Kd gone.tga\nnewmtl none\nKa 0 0 0\n"
-                 "newmtl bumpy\nbump bump.tga\n");
+                 "newmtl bumpy\nBUMP bump.tga\n");
     std::string obj = "mtllib lib/m.mtl\n" + full_square;
     for (const std::string name : {"full", "part", "none", "bumpy"}) obj += "usemtl " + name + "\nf 1/1 2/2 3/3\n";
     CHECK_EQ(maps(folder.load(obj)), "100 -1 120 110 130; 100 -1 -1 -1 -1; -1 -1 -1 -1 -1; -1 -1 140 -1 -1; ");
@@ -638,23 +723,82 @@ TEST("the maps of an .mtl, relative to it, before those by suffix") {
              "100 -1 120 110 130; 100 -1 30 40 50; 10 -1 30 40 50; 10 -1 140 40 50; ");
 }
 
-TEST("a map that is no .tga, or is missing, is a note; one that is corrupt is an error, in a fixed order") {
+TEST("-s and -o of a map scale and shift it") {
     const Folder folder;
-    const std::string mtl =
-        "newmtl a\n\nmap_Kd texture.png\nmap_Ks gone.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke -bm x y.jpg\n";
-    const std::string left_out =
-        "m.mtl:3: 'texture.png' is not a TGA file, left out\nm.mtl:4: 'gone.tga' does not exist, left out\n";
+    folder.picture("a.tga", 1);
+    const Model m = folder.load("usemtl a\n" + textured,
+                                "newmtl a\nmap_Kd -s 2 -o .5 .25 1 a.tga\nmap_Ks -o -1 -s 3 4 a.tga\n"
+                                "map_Ke -bm 7 -s x -o nan 1 a.tga\nmap_Bump a.tga\n");
+    const Material& a = m.materials()[0];
+    CHECK_EQ(maps(m), "1 -1 1 1 1; ");
+    CHECK(a.diffuse.is_moved && a.diffuse.scale == (vec2{2, 1}) && a.diffuse.offset == (vec2{.5, .25}));
+    CHECK(a.specular.is_moved && a.specular.scale == (vec2{3, 4}) && a.specular.offset == (vec2{-1, 0}));
+    CHECK(a.glow.scale == (vec2{1, 1}) && a.glow.offset == (vec2{0, 1}));
+    CHECK(!a.tangent.is_moved);
+}
+
+TEST("a map is found by its last part in any case, beside a link's target, as .tga of the same stem; else a note") {
+    const Folder folder;
+    fs::create_directories(folder / "maps");
+    folder.picture("maps/Wood.tga", 10);
+    folder.picture("metal.TGA", 20);
+    const std::string obj = "usemtl a\n" + textured;
+    const auto drawn = [&](const std::string& name) {
+        return maps(folder.load(obj, "newmtl a\nmap_Kd " + name + "\n"));
+    };
+    for (const std::string name : {"maps/Wood.tga", "maps\\wood.TGA", "maps/WOOD.png", "maps//wood"})
+        CHECK_EQ(drawn(name), "10 -1 -1 -1 -1; ");
+    for (const std::string name : {"metal.TGA", "C:\\art\\Metal.tga", "/usr/none/METAL.tga", "maps/metal.png",
+                                   "-s 1 metal"})
+        CHECK_EQ(drawn(name), "20 -1 -1 -1 -1; ");
+    folder.picture("METAL.tga", 30);  // where several are the same in small letters, one is always the one
+    CHECK_EQ(drawn("metal.tga"), "30 -1 -1 -1 -1; ");
+
+    for (const auto& [bytes, kind] : std::vector<std::pair<std::string, std::string>>{
+             {"\x89PNG\r\n", "png:"}, {"\xFF\xD8\xFF\xE0", "jpeg:"}, {"GIF89a", "gif:"}, {"BM12", "bmp:"}, {"???", ""}})
+        for (const std::string name : {"t.png", "t.TGA", "t"}) {
+            if (kind.empty() && name == "t.TGA") continue;  // then it is a bad TGA file
+            folder.write(name, bytes);
+            CHECK_EQ(drawn(name), "-1 -1 -1 -1 -1; a picture that is not TGA, left out; to convert it: convert '" +
+                                      kind + name + "' 't.tga'\n");
+            fs::remove(folder / name);
+        }
+    CHECK_EQ(drawn("gone.tga"), "-1 -1 -1 -1 -1; a picture that is not there, left out: 'gone.tga'\n");
+    CHECK_EQ(drawn(""), "-1 -1 -1 -1 -1; a picture that is not there, left out: ''\n");
+    folder.write("t.png", "\x89PNG");
+    folder.picture("t.tga", 40);
+    CHECK_EQ(drawn("t.png"), "40 -1 -1 -1 -1; ");
+    folder.picture("m_diffuse.tga", 50);  // by its suffix, instead of what is left out
+    CHECK_EQ(drawn("gone.tga").substr(0, 17), "50 -1 -1 -1 -1; a");
+    folder.write("m_diffuse.tga", "\x89PNG");
+    CHECK_EQ(maps(folder.load(textured)), "-1 -1 -1 -1 -1; a picture that is not TGA, left out; to convert it: "
+                                          "convert 'png:m_diffuse.tga' 'm_diffuse.tga'\n");
+
+    std::error_code no_links;
+    fs::create_directories(folder / "real");
+    folder.write("real/x.obj", "mtllib x.mtl\nusemtl a\n" + textured);
+    folder.write("real/x.mtl", "newmtl a\nmap_Ks s.tga\n");
+    folder.picture("real/s.tga", 60);
+    folder.picture("real/x_glow.tga", 70);
+    fs::create_symlink(folder / "real/x.obj", folder / "link.obj", no_links);
+    if (no_links) return;
+    Model linked(folder / "link.obj");
+    linked.load_textures();
+    CHECK_EQ(maps(linked), "-1 -1 -1 60 70; ");
+}
+
+TEST("a corrupt picture is an error, in a fixed order; what no face uses is not even noted") {
+    const Folder folder;
+    const std::string mtl = "newmtl a\nmap_Ks gone.tga\nmap_Kd lost.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke x.jpg\n";
     const std::string obj = textured + "usemtl a\nf 1/1 2/2 3/3\nusemtl unused\n";
     folder.write("bad.tga", "no picture");
-    CHECK_EQ(maps(folder.load(obj, mtl)), "-1 -1 -1 -1 -1; -1 -1 -1 -1 -1; " + left_out);
-    folder.picture("m_diffuse.tga", 10);
-    CHECK_EQ(maps(folder.load(obj, mtl)), "10 -1 -1 -1 -1; 10 -1 -1 -1 -1; " + left_out);  // instead
+    CHECK_EQ(maps(folder.load(obj, mtl)),
+             "-1 -1 -1 -1 -1; -1 -1 -1 -1 -1; a picture that is not there, left out: 'gone.tga' and 1 more\n");
     CHECK_THROWS(folder.load("usemtl unused\n" + textured, mtl), "bad.tga: ");
 
-    // The errors of the .obj, of the .mtl, then of the textures by their names.
+    // The errors of the .obj, then of the textures by their names.
     for (const char* name : suffixes) folder.write(name, "no picture");
     CHECK_THROWS(folder.load(textured + "f 0 0 0\n", "Kd x\n"), "m.obj:13: vertex index 0");
-    CHECK_THROWS(folder.load(textured, "Kd x\n"), "m.mtl:1: 'x' is no finite number");
     for (int i = 0; i < 50; i++) CHECK_THROWS(folder.load(textured, ""), "m_diffuse.tga: ");
     fs::remove(folder / "m_diffuse.tga");
     for (int i = 0; i < 50; i++) CHECK_THROWS(folder.load(textured, ""), "m_glow.tga: ");
@@ -666,7 +810,7 @@ TEST("a picture that materials share is decoded once") {
     const std::string two = "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n";
     const Model m = folder.load(full_square + two, "newmtl a\nnewmtl b\n");
     CHECK_EQ(maps(m), "5 -1 -1 -1 -1; 5 -1 -1 -1 -1; ");
-    CHECK(m.materials()[0].diffuse == m.materials()[1].diffuse);
+    CHECK(m.materials()[0].diffuse.picture == m.materials()[1].diffuse.picture);
 }
 
 TEST("a vertex that no face uses is put where another is; move puts each where it is told, and the box follows") {

@@ -344,16 +344,21 @@ CHECK(unseen > 900 && covering > 900);
 }
 
 TEST("texels: nearest, wrapped, v upwards; grey is grey in all channels") {
-    TGAImage map(4, 2, TGAImage::GRAYSCALE);
-    for (int i = 0; i < 8; i++) *map.pixel(i % 4, i / 4) = static_cast<std::uint8_t>(i);
+    TGAImage picture(4, 2, TGAImage::GRAYSCALE);
+    for (int i = 0; i < 8; i++) *picture.pixel(i % 4, i / 4) = static_cast<std::uint8_t>(i);
+    Map map;
+    map.picture = std::make_shared<TGAImage>(picture);
     const auto texel = [&](double u, double v) {
-        const Color c = Texels(map, wrapped({u, v})).bgr();
+        const Color c = Texels(map, UV({u, v})).bgr();
         CHECK(c[0][0] == c[1][0] && c[0][0] == c[2][0]);
         return static_cast<int>(c[0][lanes - 1]);
     };
     constexpr struct { double u, v; int texel; } cases[] = {
         {0, 0, 0}, {.26, .2, 1}, {.99, .99, 7}, {1, 1, 0}, {-.01, -.01, 7}, {-1e-20, 5.6, 7}, {1e300, -1e300, 0}};
     for (const auto& [u, v, expected] : cases) CHECK_EQ(texel(u, v), expected);
+    map.scale = {.5, 2}, map.offset = {.25, -.5}, map.is_moved = true;
+    for (const auto& [u, v, expected] : cases)  // wrapped after that, not before
+        if (u < 1e9 && u != -1e-20) CHECK_EQ(texel((u - .25) * 2, (v + .5) / 2), expected);
 }
 
 TEST("integer powers") {
