@@ -25,7 +25,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     std::filesystem::path out = ".";
     enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
     bool own_light = false, tangent = false, fit = true, quiet = false, help = false, version = false;
-    int threads = thread_count(), frames = 1;
+    int threads = 0, frames = 1;  // 0: all processors
 };
 
 // ---- pass 1: what the light sees ----
@@ -204,21 +204,23 @@ struct Value {
         char rest;  // what follows the last number, which nothing should
         if (std::sscanf(text.c_str(), "%lf%c", &n, &rest) != 1 || !std::isfinite(n)) fail("a number");
     }
-    void read(int& n, int most) const {
+    void read(int& n, int most, int least = 1) const {
         char rest;
-        if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < 1 || n > most)
-            fail("1 to " + std::to_string(most));
+        if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < least || n > most)
+            fail(std::to_string(least) + " to " + std::to_string(most));
     }
     void read_size(int& w, int& h) const {
-        char rest;
-        if (std::sscanf(text.c_str(), "%5dx%5d%c", &w, &h, &rest) != 2 || std::min(w, h) < 1 ||
-            std::max(w, h) > max_size)
-            fail("WxH, each 1 to " + std::to_string(max_size));
+        char x = 'x', rest;
+        const int read = std::sscanf(text.c_str(), "%5d%c%5d%c", &w, &x, &h, &rest);
+        if (read == 1) h = w;
+        if ((read != 1 && read != 3) || (x != 'x' && x != 'X') || std::min(w, h) < 1 || std::max(w, h) > max_size)
+            fail("N or WxH, each 1 to " + std::to_string(max_size));
     }
     void read(vec3& v) const {
         char rest;
-        if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(norm(v) <= 1e307))
-            fail("three numbers X,Y,Z, a length of at most 1e307");
+        if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3)
+            fail("three numbers X,Y,Z joined by commas, as in 1,1,0");
+        if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
     }
     int one_of(const std::vector<std::string>& names) const {  // which
         const auto found = std::find(names.begin(), names.end(), text);
@@ -230,17 +232,19 @@ struct Value {
 struct Option {
     const char *name, *takes, *help;
     void (*set)(Options&, const Value&);
+    const char* short_name = "";
 };
 
 static const Option options[] = {
-    {"-o", "DIR", "folder of the two pictures (.)", [](Options& o, const Value& v) { o.out = v.text; }},
-    {"--size", "WxH", "the picture's pixels (800x800)",
+    {"--output", "DIR", "folder of the two pictures (.)", [](Options& o, const Value& v) { o.out = v.text; }, "-o"},
+    {"--size", "WxH", "the picture's pixels; N is NxN (800x800)",
      [](Options& o, const Value& v) { v.read_size(o.width, o.height); }},
     {"--shadow-size", "N", "the shadow buffer's pixels a side (800)",
      [](Options& o, const Value& v) { v.read(o.shadow_size, max_size); }},
     {"--eye", "X,Y,Z", "the viewer (1,1,4)", [](Options& o, const Value& v) { v.read(o.eye); }},
     {"--center", "X,Y,Z", "what the viewer looks at (0,0,0)", [](Options& o, const Value& v) { v.read(o.center); }},
-    {"--up", "X,Y,Z", "what appears upwards (0,1,0)", [](Options& o, const Value& v) { v.read(o.up); }},
+    {"--up", "X,Y,Z", "what appears upwards; 0,0,0: the axis that the view is least along (0,1,0)",
+     [](Options& o, const Value& v) { v.read(o.up); }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
      [](Options& o, const Value& v) { v.read(o.light_dir), o.own_light = true; }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
@@ -255,30 +259,39 @@ static const Option options[] = {
      [](Options& o, const Value&) { o.tangent = true; }},
     {"--no-fit", "", "keep the scene's own coordinates (default: fit it where it is cut off, off the centre or small)",
      [](Options& o, const Value&) { o.fit = false; }},
-    {"--threads", "N", "the pictures are the same at any number (all processors)",
-     [](Options& o, const Value& v) { v.read(o.threads, 256); }},
+    {"--threads", "N", "the pictures are the same at any number (0, all processors)",
+     [](Options& o, const Value& v) { v.read(o.threads, 256, 0); }},
     {"--frames", "N", "draw N times and tell the median time of each pass (1)",
      [](Options& o, const Value& v) { v.read(o.frames, 9999); }},
-    {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }},
-    {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }},
-    {"--version", "", "print the version", [](Options& o, const Value&) { o.version = true; }},
+    {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }, "-q"},
+    {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }, "-h"},
+    {"--version", "", "print the version", [](Options& o, const Value&) { o.version = true; }, "-V"},
 };
 
 static Options parse(int argc, char** argv) {
     Options opt;
+    bool only_models = false;  // after --
     for (int i = 1; i < argc && !opt.help && !opt.version; i++) {
         const std::string arg = argv[i];
-        const auto is_named = [&](const Option& o) { return arg == o.name; };
-        const auto option = std::find_if(std::begin(options), std::end(options), is_named);
-        if (option == std::end(options)) {
-            if (arg.size() > 1 && arg[0] == '-') throw UsageError("unknown option " + arg);
+        if (only_models || arg[0] != '-' || arg == "-") {
             opt.models.push_back(arg);
-        } else if (!*option->takes) {
-            option->set(opt, {});
-        } else {
-            if (++i == argc) throw UsageError(arg + ": a value is missing");
-            option->set(opt, {arg, argv[i]});
+            continue;
         }
+        if ((only_models = arg == "--")) continue;
+        const std::size_t equals = arg.find('=');
+        const bool joined = equals != arg.npos;  // --name=value
+        Value value{arg.substr(0, equals), joined ? arg.substr(equals + 1) : ""};
+        const auto is_named = [&](const Option& o) { return value.option == o.name || value.option == o.short_name; };
+        const auto option = std::find_if(std::begin(options), std::end(options), is_named);
+        if (option == std::end(options)) throw UsageError("unknown option " + value.option);
+        if (!*option->takes && joined) throw UsageError(value.option + " takes no value");
+        if (*option->takes && !joined) {
+            // What looks like the next option is no value: -o --quiet is not to make a folder of that name.
+            if (++i == argc || std::string(argv[i]).rfind("--", 0) == 0)
+                throw UsageError(value.option + ": a value is missing");
+            value.text = argv[i];
+        }
+        option->set(opt, value);
     }
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
     if (opt.light_dir == vec3{}) throw UsageError("--light has no direction");
@@ -291,8 +304,11 @@ static Options parse(int argc, char** argv) {
 static void print_help() {
     std::puts("usage: umbra [options] [model.obj ...]\n\n"
               "Draws the models, lit and with hard shadows, into framebuffer.tga, and what the light sees into\n"
-              "depth.tga. Several models share one scene. Without a model: the idol.\n");
-    for (const Option& o : options) std::printf("  %-18s %s\n", (std::string(o.name) + " " + o.takes).c_str(), o.help);
+              "depth.tga. Several models share one scene; - is one on standard input. Without a model: the idol.\n");
+    for (const Option& o : options) {
+        const std::string names = std::string(o.short_name) + (*o.short_name ? ", " : "") + o.name;
+        std::printf("  %-18s %s\n", (names + ' ' + o.takes).c_str(), o.help);
+    }
 }
 
 // One line on standard error, whatever a name on the command line is made of; returns the status.
@@ -408,7 +424,7 @@ static void run(Options opt) {
 
 int main(int argc, char** argv) try {
     const Options opt = parse(argc, argv);
-    use_threads(opt.threads);
+    if (opt.threads) use_threads(opt.threads);
     if (opt.help) print_help();
     else if (opt.version) std::puts("umbra " UMBRA_VERSION);
     else run(opt);

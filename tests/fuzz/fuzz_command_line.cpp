@@ -3,6 +3,8 @@
 // bytes between them or, where it has none, newlines.
 #include "fuzz.h"
 
+#include <set>
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static const TemporaryFolder folder("fuzz_command_line");
     static ScratchFile model(folder / "model.obj");
@@ -25,13 +27,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     REQUIRE(status >= 0 && status <= 2);
     if (status != 1) return 0;
 
-    // ... and what is accepted draws the model: the last value of an option counts.
+    // ... and what is accepted draws the model: the last value of an option counts. After -- there are models alone.
+    static const std::set<std::string> flags{"--tangent", "--no-fit", "--quiet", "-q"};
     std::vector<std::string> drawing;
-    for (std::size_t i = 0; i < words.size(); i++) {
+    for (std::size_t i = 0; i < words.size() && words[i] != "--"; i++) {
         drawing.push_back(words[i]);
         const bool is_option = words[i].starts_with('-') && words[i].size() > 1;
-        const bool is_flag = words[i] == "--tangent" || words[i] == "--no-fit" || words[i] == "--quiet";
-        if (is_option && !is_flag) drawing.push_back(words[++i]);
+        const bool takes_next = words[i].find('=') == std::string::npos && !flags.contains(words[i]);
+        if (is_option && takes_next) drawing.push_back(words[++i]);
         else if (!is_option && i > 0) drawing.back() = model.path().string();
     }
     for (const char* word : {"--size", "9x7", "--shadow-size", "5", "--frames", "1", "--threads", "2", "--quiet", "-o"})

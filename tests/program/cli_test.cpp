@@ -9,10 +9,10 @@ namespace {
 
 const std::string small = "--size 40x40 --shadow-size 30 ", triangle = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
 
-// Options with the names of their values, as "--size WxH". They stand at the head of lines, after two blanks or in a
-// table's first column; several in a line have commas between them.
+// Options with the names of their values, as "-o, --output DIR". They stand at the head of lines, after two blanks and
+// before two, or in a table's first column; several in a line have commas between them.
 std::set<std::string> options_in(const std::string& text) {
-    static const std::regex option("(?:\n  |\n\\| `|`, `)(-[^ `]*(?: [^ `]+)?)");
+    static const std::regex option("(?:\n  |\n\\| `|`, `)(-[^ `\n]+(?: [^ `\n]+)*)");
     return {std::sregex_token_iterator(text.begin(), text.end(), option, 1), {}};
 }
 
@@ -43,7 +43,7 @@ TEST("version, and help: it lists the options that README.md has in its table") 
     table.erase(0, table.find("\n## Options\n") + 1);
     table.erase(table.find("\n## "));
     const std::set<std::string> listed = options_in(help.out), in_table = options_in(table);
-    CHECK(listed.count("--size WxH") == 1 && listed.count("--help") == 1 && listed.size() > 10);
+    CHECK(listed.count("--size WxH") == 1 && listed.count("-h, --help") == 1 && listed.size() > 10);
     Strings in_one_of_them;
     std::set_symmetric_difference(listed.begin(), listed.end(), in_table.begin(), in_table.end(),
                                   std::back_inserter(in_one_of_them));
@@ -57,20 +57,41 @@ TEST("a wrong command line ends with status 2 and one line") {
     };
     const Strings no_vectors{"1,2", "1,2,3,4", "1,2,x", "nan,0,0", "inf,0,0", "1,,2", "''", "1e999,0,0"};
     const std::map<std::string, Strings> wrong_values{
-        {"--only", {"", "frame", "depth.tga"}},
-        {"-o", {}}, {"--size", {"5", "5x", "x5", "5x5x5", "axb", "1e3x5", "99999999999x5", "5.5x5"}},
+        {"--only", {"''", "frame", "depth.tga"}}, {"-o", {}}, {"--output", {}},
+        {"--size", {"0", "5x", "x5", "5X", "5xx5", "5x5x5", "axb", "1e3x5", "99999999999x5", "5.5x5"}},
         {"--shadow-size", {"0", "-1", "16385", "x", "1.5"}}, {"--eye", no_vectors}, {"--center", no_vectors},
         {"--up", no_vectors}, {"--light", joined(no_vectors, {"0,0,0"})}, {"--bias", {"x", "1x", "nan", "inf"}},
         {"--shadow", {"soft", "Map", "maps", "''"}}, {"--draw", {"depth", "colour", "Normal", "''"}},
-        {"--threads", {"0", "-2", "257", "all"}}};
+        {"--threads", {"-1", "257", "all"}}};
     for (const auto& [option, values] : wrong_values) {
-        check(option + ": a value is missing", {option});
-        check(option, each(option + " %", values));
+        check(option + ": a value is missing", {option, option + " --quiet"});
+        check(option, joined(each(option + " %", values), each(option + "=%", values)));
     }
-    check("--frobnicate", {"--frobnicate", "--size 5x5 --frobnicate 3"});
+    for (const std::string option : {"--eye", "--center", "--up", "--light"})
+        check(option + ": \"1\" is not three numbers X,Y,Z joined by commas, as in 1,1,0", {option + " 1 1 0"});
+    check("takes no value", {"--quiet=yes", "-q=", "--help=x"});
+    check("unknown option --frobnicate (", {"--frobnicate", "--size 5x5 --frobnicate 3", "--frobnicate=3"});
     check("same point", {"--eye 1,1,1 --center 1,1,1"});
     check("--two?lines", {"'--two\nlines'"});
     check("\"5x5?\"", {"--size '5x5\n'"});
+}
+
+TEST("the command line as people type it") {
+    const Folder f;
+    for (const std::string name : {"m.obj", "-m.obj"}) f.write(name, triangle);
+    for (const auto& [typed, meant] : std::map<std::string, std::string>{
+             {"--eye=2,1,4 m.obj", "--eye 2,1,4 m.obj"}, {"--size 40 m.obj", "--size 40x40 m.obj"},
+             {"--size 40X30 m.obj", "--size=40x30 m.obj"}, {"--threads 0 m.obj", "m.obj"}, {"-- -m.obj", "m.obj"},
+             {"--up 0,0,0 --eye 4,1,4 --shadow off m.obj", "--up 0,1,0 --eye 4,1,4 --shadow off m.obj"},
+             {"--up 0,0,0 --eye 4,4,1 --shadow off m.obj", "--up 0,0,1 --eye 4,4,1 --shadow off m.obj"}}) {
+        const Outcome a = f.run(small + typed), b = f.run(small + meant);
+        if (!CHECK(a.status == 0 && a.err.empty() && !a.frame.empty() && a.same_pictures(b)))
+            std::cerr << "    umbra " << typed << ": " << a.err << '\n';
+    }
+    for (const auto& [brief, name] : std::map<std::string, std::string>{{"-h", "--help"}, {"-V", "--version"}})
+        CHECK(f.run(brief).out == f.run(name).out);
+    CHECK(f.run(small + "-q m.obj").out.empty());
+    CHECK(f.run("-- --help").err.rfind("umbra: --help: ", 0) == 0);  // a model
 }
 
 TEST("a file that is missing or no model is one line that names it, status 1, and earlier pictures as they were") {
