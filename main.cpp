@@ -216,6 +216,15 @@ struct Value {
         if ((read != 1 && read != 3) || (x != 'x' && x != 'X') || std::min(w, h) < 1 || std::max(w, h) > max_size)
             fail("N or WxH, each 1 to " + std::to_string(max_size));
     }
+    void read(std::filesystem::path& folder) const {
+        folder = text;
+        std::error_code ignored;
+        const auto status = std::filesystem::status(folder, ignored);
+        const std::filesystem::path ending = folder.extension();
+        if (!is_directory(status) &&
+            (text.empty() || exists(status) || ending == ".tga" || ending == ".png" || ending == ".jpg"))
+            fail("a folder: framebuffer.tga and depth.tga are written into it");
+    }
     void read(vec3& v) const {
         char rest;
         if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3)
@@ -236,7 +245,8 @@ struct Option {
 };
 
 static const Option options[] = {
-    {"--output", "DIR", "folder of the two pictures (.)", [](Options& o, const Value& v) { o.out = v.text; }, "-o"},
+    {"--output", "DIR", "folder of the two pictures, made where it is missing (.)",
+     [](Options& o, const Value& v) { v.read(o.out); }, "-o"},
     {"--size", "WxH", "the picture's pixels; N is NxN (800x800)",
      [](Options& o, const Value& v) { v.read_size(o.width, o.height); }},
     {"--shadow-size", "N", "the shadow buffer's pixels a side (800)",
@@ -345,6 +355,18 @@ static void leave_out(const Options& opt, Scene& scene) {
     }
 }
 
+// Before anything is drawn: makes the folder, and tries whether the pictures can be written there.
+static void prepare_folder(const Options& opt) {
+    std::error_code error;
+    std::filesystem::create_directories(opt.out, error);
+    if (error) throw std::runtime_error(opt.out.string() + ": cannot be made: " + error.message());
+    const auto try_file = [&](const char* name) {  // what is written goes again, since nothing commits it
+        TGAFile(TGAImage(1, 1, TGAImage::GRAYSCALE), opt.out / name).write();
+    };
+    if (opt.method == Options::Method::map && opt.only != Options::Only::framebuffer) try_file("depth.tga");
+    if (opt.only != Options::Only::depth) try_file("framebuffer.tga");
+}
+
 // Writes both pictures or, where one does not fit on the disk, none.
 static void write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
     std::optional<TGAFile> files[2];
@@ -386,6 +408,7 @@ static double median(std::vector<double>& values) {
 
 static void run(Options opt) {
     const double start = milliseconds();
+    prepare_folder(opt);
     Scene scene = load(opt);
     if (opt.fit && fit(scene.models)) {
         if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the lesson's leaves dark what faces the viewer

@@ -18,6 +18,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         words.push_back(input.substr(at, end - at));
         at = end + 1;
     }
+    for (std::size_t i = 1; i < words.size(); i++) {  // the folders that -o makes
+        const bool joined = words[i].starts_with("-o=") || words[i].starts_with("--output=");
+        if (!joined && ((words[i] != "-o" && words[i] != "--output") || ++i == words.size())) continue;
+        const std::size_t at = joined ? words[i].find('=') + 1 : 0;
+        if (at == words[i].size()) continue;
+        std::replace(words[i].begin(), words[i].end(), '/', '_');
+        words[i].insert(at, (folder / "").string());
+    }
     // A missing file stands first, so that the words' own files are not read and their pictures not drawn ...
     std::vector<std::string> missing = words;
     missing.insert(missing.begin() + 1, (folder / "missing.obj").string());

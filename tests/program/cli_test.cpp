@@ -56,8 +56,10 @@ TEST("a wrong command line ends with status 2 and one line") {
         for (const std::string& arguments : wrong) check_refused(f, arguments, 2, text);
     };
     const Strings no_vectors{"1,2", "1,2,3,4", "1,2,x", "nan,0,0", "inf,0,0", "1,,2", "''", "1e999,0,0"};
+    f.write("letter", "hi");
+    const Strings files{"''", "letter", "x.tga", "new/x.png"};
     const std::map<std::string, Strings> wrong_values{
-        {"--only", {"''", "frame", "depth.tga"}}, {"-o", {}}, {"--output", {}},
+        {"--only", {"''", "frame", "depth.tga"}}, {"-o", files}, {"--output", files},
         {"--size", {"0", "5x", "x5", "5X", "5xx5", "5x5x5", "axb", "1e3x5", "99999999999x5", "5.5x5"}},
         {"--shadow-size", {"0", "-1", "16385", "x", "1.5"}}, {"--eye", no_vectors}, {"--center", no_vectors},
         {"--up", no_vectors}, {"--light", joined(no_vectors, {"0,0,0"})}, {"--bias", {"x", "1x", "nan", "inf"}},
@@ -69,6 +71,7 @@ TEST("a wrong command line ends with status 2 and one line") {
     }
     for (const std::string option : {"--eye", "--center", "--up", "--light"})
         check(option + ": \"1\" is not three numbers X,Y,Z joined by commas, as in 1,1,0", {option + " 1 1 0"});
+    check("is not a folder", each("-o %", files));
     check("takes no value", {"--quiet=yes", "-q=", "--help=x"});
     check("unknown option --frobnicate (", {"--frobnicate", "--size 5x5 --frobnicate 3", "--frobnicate=3"});
     check("same point", {"--eye 1,1,1 --center 1,1,1"});
@@ -94,6 +97,14 @@ TEST("the command line as people type it") {
     CHECK(f.run("-- --help").err.rfind("umbra: --help: ", 0) == 0);  // a model
 }
 
+TEST("the folder of the pictures is made") {
+    const Folder f;
+    const Outcome here = f.run(small);
+    CHECK_EQ(f.run(small + "-o new/one.tga/").status, 0);
+    CHECK(here.depth == f.read("new/one.tga/depth.tga") && here.frame == f.read("new/one.tga/framebuffer.tga"));
+    CHECK_EQ(f.run(small + "-o new/one.tga").status, 0);  // now that it is there
+}
+
 TEST("a file that is missing or no model is one line that names it, status 1, and earlier pictures as they were") {
     const Folder f;
     f.write("good.obj", triangle);
@@ -105,7 +116,7 @@ TEST("a file that is missing or no model is one line that names it, status 1, an
         for (const auto& [arguments, named] : std::map<std::string, std::string>{
                  {"missing.obj", "missing.obj:"}, {".", ".:"}, {"''", ":"}, {"'no\nsuch.obj'", "no?such.obj:"},
                  {"bad.obj", "bad.obj:4:"}, {"few.obj", "few.obj:2:"}, {"good.obj few.obj", "few.obj:2:"},
-                 {"map.obj", "map_diffuse.tga:"}, {"-o nowhere good.obj", "nowhere"}})
+                 {"map.obj", "map_diffuse.tga:"}})
             check_refused(f, arguments, 1, "umbra: " + named);
         check_refused(f, "--size 0x1 good.obj", 2, "--size");
         const Outcome o = f.run(small + "good.obj");

@@ -129,10 +129,9 @@ struct Stage : TemporaryFolder {
         CHECK(contents(out) == after);
     }
     // It cannot write the file in the folder, and leaves all that is there.
-    void check_refused(const std::string& file, const std::string& reason, const Prepare& prepare = nothing,
-                       const std::string& folder = "out") const {
+    void check_refused(const std::string& file, const std::string& reason, const Prepare& prepare = nothing) const {
         const Contents there = contents(out);
-        CHECK(run(prepare, {"-o", folder}).refused(folder + '/' + file + ": cannot write: " + reason));
+        CHECK(run(prepare).refused("out/" + file + ": cannot write: " + reason));
         CHECK(contents(out) == there);
     }
     // Each picture is the old one or the new one; nothing else is there, but what a killed run may leave.
@@ -222,15 +221,17 @@ TEST("a temporary file on a full device is one error line") {
         });
 }
 
-TEST("a folder that is not there, is a file or may not be written to is one error line") {
+TEST("a folder that cannot be made or may not be written to is one error line, before anything is read") {
     const Stage stage(60);
-    stage.check_refused(depth_tga, "No such file or directory", nothing, "nowhere");
-    stage.check_refused(depth_tga, "Not a directory", nothing, "waves.obj");
-    stage.check_refused(depth_tga, "Not a directory", nothing, "out/depth.tga");
+    const auto check = [&](const std::string& folder, const std::string& line) {  // before the models are missed
+        CHECK(stage.run(give_up_rights, {"-o", folder, "missing.obj"}).refused(line));
+    };
+    check("waves.obj/new", "waves.obj/new: cannot be made: Not a directory");
     CHECK_EQ(contents(stage.path()).size(), 2u);
     for (const int rights : {0505, 0}) {
         fs::permissions(stage.out, fs::perms(rights));
-        CHECK(stage.run(give_up_rights).refused("out/depth.tga: cannot write: Permission denied"));
+        check("out", "out/depth.tga: cannot write: Permission denied");
+        check("out/new", "out/new: cannot be made: Permission denied");
         fs::permissions(stage.out, fs::perms::owner_all);
         CHECK(contents(stage.out) == stage.before);
     }
@@ -287,7 +288,12 @@ TEST("a run killed at any moment leaves whole pictures, and the next one draws")
         stage.put(stage.before);
         const Outcome o = stage.run(nothing, {}, [&](pid_t pid) {
             const fs::path file = stage.out / awaited;
-            for (siginfo_t ended{}; !fs::exists(file) && ended.si_pid == 0;)
+            const auto is_there = [&] {  // with more in it than the trial before the run
+                std::error_code error;
+                const auto size = fs::file_size(file, error);
+                return awaited.empty() || (!error && size > 100);
+            };
+            for (siginfo_t ended{}; !is_there() && ended.si_pid == 0;)
                 waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT);
             std::this_thread::sleep_for(length * after);
             kill(pid, SIGKILL);
