@@ -163,7 +163,7 @@ static Camera viewer(const Options& opt) {
 static void first_pass(const Options& opt, const Models& casters, Shadow& shadow) {
     if (casters.empty()) return;
     shadow.method = opt.method;
-    const bool exact = opt.method == Options::Method::exact, classic = opt.bias && !exact;
+    const bool exact = opt.method == Options::Method::exact, classic = opt.bias.has_value();
     const int size = exact ? LightGrid::good_cells(casters) : opt.shadow_size;
     Camera light{lookat(opt.light_dir, opt.center, opt.up), projection(0), middle_viewport(size, size)};
     if (!classic) light = fitted(light, casters, size);
@@ -304,6 +304,7 @@ static Options parse(int argc, char** argv) {
         option->set(opt, value);
     }
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
+    if (opt.bias && opt.method != Options::Method::map) throw UsageError("--bias belongs to --shadow map");
     if (opt.light_dir == vec3{}) throw UsageError("--light has no direction");
     if (opt.only == Options::Only::depth && opt.method != Options::Method::map)
         throw UsageError("--only depth: there is no shadow buffer without --shadow map");

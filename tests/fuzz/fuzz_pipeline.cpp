@@ -242,8 +242,10 @@ void draw_lesson(Input& in, bool many) {
         if (!(norm(v) <= 1e307)) return;  // the command line refuses it
         option(name, exactly("%.17g,%.17g,%.17g", v));
     }
-    option("--shadow", std::array{"map", "exact", "off"}[(flags >> 3 & 3) % 3]);
-    if (more & 1) option("--bias", exactly("%.17g", {in.finite(std::numeric_limits<double>::max()), 0, 0}));
+    const int shadow = (flags >> 3 & 3) % 3;
+    option("--shadow", std::array{"map", "exact", "off"}[shadow]);
+    if (more & 1 && shadow == 0)
+        option("--bias", exactly("%.17g", {in.finite(std::numeric_limits<double>::max()), 0, 0}));
     file.assign(read_model(in, many, more & 2, more & 4));
     if (more & 8) words.push_back("--no-fit");
     if (more & 16 && !(light == vec3{})) {

@@ -72,6 +72,7 @@ TEST("a wrong command line ends with status 2 and one line") {
     for (const std::string option : {"--eye", "--center", "--up", "--light"})
         check(option + ": \"1\" is not three numbers X,Y,Z joined by commas, as in 1,1,0", {option + " 1 1 0"});
     check("is not a folder", each("-o %", files));
+    check("--bias belongs to --shadow map", each("--bias 1 --shadow %", {"exact", "off"}));
     check("takes no value", {"--quiet=yes", "-q=", "--help=x"});
     check("unknown option --frobnicate (", {"--frobnicate", "--size 5x5 --frobnicate 3", "--frobnicate=3"});
     check("same point", {"--eye 1,1,1 --center 1,1,1"});
