@@ -329,6 +329,10 @@ static int complain(std::string what, int status) {
     return status;
 }
 
+static void note(const Options& opt, const std::string& what) {
+    if (!opt.quiet) complain(what, 0);
+}
+
 struct Scene {
     std::vector<Model> models;
     Models seen;     // by the viewer: only these are shaded, and have textures
@@ -351,8 +355,7 @@ static void leave_out(const Options& opt, Scene& scene) {
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         Model& model = scene.models[i];
         if (std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures();
-        for (const std::string& note : model.notes())
-            if (!opt.quiet) complain(opt.models[i].string() + ": " + note, 0);
+        for (const std::string& what : model.notes()) note(opt, opt.models[i].string() + ": " + what);
     }
 }
 
@@ -368,18 +371,36 @@ static void prepare_folder(const Options& opt) {
     if (opt.only != Options::Only::depth) try_file("framebuffer.tga");
 }
 
-// Writes both pictures or, where one does not fit on the disk, none.
-static void write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
+// Writes both pictures or, where one does not fit on the disk, none. Returns where they are.
+static std::string write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
+    const std::filesystem::path paths[] = {opt.out / "depth.tga", opt.out / "framebuffer.tga"};
     std::optional<TGAFile> files[2];
     parallel_for(2, [&](int i, int) {
         if (i == 0 && shadow.shadowbuffer.width() && opt.only != Options::Only::framebuffer)
-            files[i].emplace(depth_picture(shadow.shadowbuffer), opt.out / "depth.tga");
-        if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, opt.out / "framebuffer.tga");
+            files[i].emplace(depth_picture(shadow.shadowbuffer), paths[i]);
+        if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, paths[i]);
     });
     for (auto& file : files)
         if (file) file->write();
-    for (auto& file : files)
-        if (file) file->commit();
+    std::string written;
+    for (int i = 0; i < 2; i++) {
+        if (files[i]) {
+            files[i]->commit();
+            written = paths[i].string() + (written.empty() ? "" : " and " + written);
+        } else if (exists(paths[i])) {
+            note(opt, paths[i].string() + " is from an earlier run: this one draws none");
+        }
+    }
+    return written;
+}
+
+// A black picture, or one without light, leaves its user with a riddle.
+static void note_darkness(const Options& opt, const TGAImage& frame, bool is_seen) {
+    const auto is_dark = [](int channel) { return channel <= 20; };  // the ambient light
+    if (!is_seen) note(opt, "nothing of the scene is seen: see --eye and --center");
+    else if (opt.draw == Options::Draw::color && opt.only != Options::Only::depth &&
+             std::all_of(frame.pixel(0, 0), frame.pixel(0, frame.height()), is_dark))
+        note(opt, "nothing that is seen is lit: see --light");
 }
 
 // The names of the kinds of map that no material of any model has, each after a comma.
@@ -433,10 +454,12 @@ static void run(Options opt) {
         depth_ms.push_back(first - began), shade_ms.push_back(milliseconds() - first);
     }
     const double drawn = milliseconds();
-    write(opt, shadow, frame);
+    const std::string pictures = write(opt, shadow, frame);
     const double written = milliseconds();
+    note_darkness(opt, frame, opt.only == Options::Only::depth ? !scene.casters.empty() : c.shaded > 0);
     if (opt.quiet) return;
     const std::string left_out = missing_maps(scene.models) + (scene.casters.empty() ? ",shadow" : "");
+    if (!pictures.empty()) std::printf("wrote %s\n", pictures.c_str());
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
                 "shadow_bytes %zu outside %ld between_samples %ld hidden %ld models %zu seen %zu casters %zu "
                 "left_out %s\n",

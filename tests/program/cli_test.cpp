@@ -7,7 +7,8 @@
 
 namespace {
 
-const std::string small = "--size 40x40 --shadow-size 30 ", triangle = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
+const std::string small = "--size 40x40 --shadow-size 30 --light 1,1,1 ",
+                  triangle = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
 
 // Options with the names of their values, as "-o, --output DIR". They stand at the head of lines, after two blanks and
 // before two, or in a table's first column; several in a line have commas between them.
@@ -28,7 +29,8 @@ TEST("the default model draws two pictures from any working directory") {
     const TGAImage depth = TGAImage::read_tga_file(f / "depth.tga");
     CHECK(frame.width() == 200 && frame.height() == 160 && frame.bytespp() == 3);
     CHECK(depth.width() == 100 && depth.height() == 100 && depth.bytespp() == 1);
-    CHECK_EQ(lines(o.out), 1);
+    CHECK_EQ(lines(o.out), 2);
+    CHECK_EQ(o.out.substr(0, o.out.find('\n')), "wrote ./framebuffer.tga and ./depth.tga");
     for (const std::string name : {"triangles", "pixels", "fragments", "load_ms", "depth_ms", "shade_ms", "write_ms"})
         CHECK(value(o.out, name) >= 0);
     CHECK(o.out.find(" left_out ") != std::string::npos);
@@ -89,7 +91,7 @@ TEST("the command line as people type it") {
              {"--up 0,0,0 --eye 4,1,4 --shadow off m.obj", "--up 0,1,0 --eye 4,1,4 --shadow off m.obj"},
              {"--up 0,0,0 --eye 4,4,1 --shadow off m.obj", "--up 0,0,1 --eye 4,4,1 --shadow off m.obj"}}) {
         const Outcome a = f.run(small + typed), b = f.run(small + meant);
-        if (!CHECK(a.status == 0 && a.err.empty() && !a.frame.empty() && a.same_pictures(b)))
+        if (!CHECK(a.status == 0 && a.err == b.err && !a.frame.empty() && a.same_pictures(b)))
             std::cerr << "    umbra " << typed << ": " << a.err << '\n';
     }
     for (const auto& [brief, name] : std::map<std::string, std::string>{{"-h", "--help"}, {"-V", "--version"}})
@@ -155,6 +157,30 @@ TEST("what is not needed is left out, and said") {
     CHECK_EQ(value(off.out, "shadow_bytes"), 0);
 }
 
+TEST("a note says what is missing: nothing seen, nothing lit, an earlier picture that is not replaced") {
+    const Folder f;
+    f.write("m.obj", triangle);
+    const std::string lit = small + "--eye 0,0,4 --light 0,0,1 ", unseen = "nothing of the scene is seen",
+                      unlit = "nothing that is seen is lit", away = "--center 9,9,9 --eye 9,9,19 ";
+    const auto notes = [&](const std::string& options, const Strings& expected) {
+        const Outcome o = f.run(lit + options + "m.obj");
+        bool ok = o.status == 0 && lines(o.err) == static_cast<long>(expected.size());
+        for (const std::string& note : expected) ok &= o.err.find("umbra: " + note) != std::string::npos;
+        if (!CHECK(ok)) std::cerr << "    umbra " << options << ": " << o.err << '\n';
+        CHECK(f.run(lit + options + "--quiet m.obj").err.empty());
+    };
+    notes("--only depth ", {});
+    notes("--only framebuffer ", {"./depth.tga is from an earlier run"});
+    notes("--shadow off ", {"./depth.tga is from an earlier run"});
+    notes("", {});
+    notes("--only depth ", {"./framebuffer.tga is from an earlier run"});
+    notes("--light 0,0,-1 ", {unlit});
+    notes("--light 0,0,-1 --draw shadow ", {});
+    notes(away, {unseen, "./depth.tga is from an earlier run"});
+    for (const char* file : {"depth.tga", "framebuffer.tga"}) std::filesystem::remove(f / file);
+    notes(away + "--only depth ", {unseen});
+}
+
 // A wall, a board behind the viewer that shadows a half of it, and something far away whose texture is no picture.
 TEST("a model that is not seen is not shaded, nor are its textures read; it throws a shadow where it can") {
     const Folder f;
@@ -163,7 +189,7 @@ TEST("a model that is not seen is not shaded, nor are its textures read; it thro
     f.write("board.obj", "v 0 -9 10\nv 9 -9 10\nv 9 9 10\nv 0 9 10\nf 1 2 3 4\n");
     f.write("far.obj", "v 99 0 0\nv 100 0 0\nv 99 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
     f.write("far_diffuse.tga", "no picture");
-    for (const std::string shadow : {"map", "exact"}) {
+    for (const std::string shadow : {"exact", "map"}) {
         const std::string options = small + "--no-fit --eye 0,0,4 --light 0,0,1 --shadow " + shadow + " ";
         const Outcome all = f.run(options + "far.obj wall.obj board.obj"), some = f.run(options + "wall.obj board.obj");
         CHECK(all.status == 0 && all.err.empty() && all.same_pictures(some));

@@ -14,7 +14,7 @@ foreach(line ${expected})
     separate_arguments(arguments UNIX_COMMAND "${options}")
     execute_process(COMMAND ${UMBRA} ${arguments} -o ${FOLDER} WORKING_DIRECTORY ${SOURCE}/obj
                     OUTPUT_VARIABLE said COMMAND_ERROR_IS_FATAL ANY OUTPUT_STRIP_TRAILING_WHITESPACE)
-    string(REGEX REPLACE " [a-z]+_ms [0-9.]+" "" said "${said}")
+    string(REGEX REPLACE "^.*\n| [a-z]+_ms [0-9.]+" "" said "${said}")  # of its last line
     if(NOT said STREQUAL counters)
       message(SEND_ERROR "umbra ${options}\n  says     ${said}\n  expected ${counters}")
     endif()

@@ -29,11 +29,13 @@ inline std::string quoted(const std::string& argument) {  // for a POSIX shell
 
 inline auto lines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
 
-// The number after the name in a line of names and values.
-inline double value(const std::string& line, const std::string& name) {
-    const std::size_t at = (' ' + line).find(' ' + name + ' ');
-    if (at == std::string::npos) throw std::runtime_error("no " + name + " in: " + line);
-    return std::stod(line.substr(at + name.size() + 1));
+// The last line of what a program prints, which is one of names and values: the number after the name.
+inline double value(const std::string& out, const std::string& name) {
+    const std::string line = '\n' + out.substr(0, out.find_last_not_of('\n') + 1);
+    const std::string last = ' ' + line.substr(line.rfind('\n') + 1);
+    const std::size_t at = last.find(' ' + name + ' ');
+    if (at == std::string::npos) throw std::runtime_error("no " + name + " in: " + out);
+    return std::stod(last.substr(at + name.size() + 2));
 }
 
 inline const std::string umbra_command = "\"" UMBRA_BINARY "\"";
