@@ -18,6 +18,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     int shadow_size = 800;          // of the shadow buffer, in pixels a side
     vec3 light_dir{1, 1, 0};        // towards the light
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
+    double zoom = 1;
     enum class Method { map, exact, off } method = Method::map;  // of shadows
     std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
@@ -155,7 +156,7 @@ struct PhongShader final : IShader {
 
 static Camera viewer(const Options& opt) {
     return {lookat(opt.eye, opt.center, opt.up), projection(-1 / norm(opt.eye - opt.center)),
-            middle_viewport(opt.width, opt.height)};
+            middle_viewport(opt.width, opt.height, opt.zoom)};
 }
 
 // Rendering the shadow buffer: the camera stands at the light. It is fitted to the casters, so that no texel is wasted;
@@ -203,6 +204,10 @@ struct Value {
     void read(double& n) const {
         char rest;  // what follows the last number, which nothing should
         if (std::sscanf(text.c_str(), "%lf%c", &n, &rest) != 1 || !std::isfinite(n)) fail("a number");
+    }
+    void read_zoom(double& n) const {
+        read(n);
+        if (n < 1e-6 || n > 1e6) fail("1e-6 to 1e6");
     }
     void read(int& n, int most, int least = 1) const {
         char rest;
@@ -255,6 +260,8 @@ static const Option options[] = {
     {"--center", "X,Y,Z", "what the viewer looks at (0,0,0)", [](Options& o, const Value& v) { v.read(o.center); }},
     {"--up", "X,Y,Z", "what appears upwards; 0,0,0: the axis that the view is least along (0,1,0)",
      [](Options& o, const Value& v) { v.read(o.up); }},
+    {"--zoom", "F", "magnifies about the middle, which a nearer eye does not (1)",
+     [](Options& o, const Value& v) { v.read_zoom(o.zoom); }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
      [](Options& o, const Value& v) { v.read(o.light_dir), o.own_light = true; }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
@@ -397,7 +404,7 @@ static std::string write(const Options& opt, const Shadow& shadow, const TGAImag
 // A black picture, or one without light, leaves its user with a riddle.
 static void note_darkness(const Options& opt, const TGAImage& frame, bool is_seen) {
     const auto is_dark = [](int channel) { return channel <= 20; };  // the ambient light
-    if (!is_seen) note(opt, "nothing of the scene is seen: see --eye and --center");
+    if (!is_seen) note(opt, "nothing of the scene is seen: see --eye, --center and --zoom");
     else if (opt.draw == Options::Draw::color && opt.only != Options::Only::depth &&
              std::all_of(frame.pixel(0, 0), frame.pixel(0, frame.height()), is_dark))
         note(opt, "nothing that is seen is lit: see --light");

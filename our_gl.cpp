@@ -36,8 +36,8 @@ mat4 viewport(double x, double y, double w, double h) {
 
 mat4 translation(const vec3& by) { return {{{1, 0, 0, by.x}, {0, 1, 0, by.y}, {0, 0, 1, by.z}, {0, 0, 0, 1}}}; }
 
-mat4 middle_viewport(int width, int height) {
-    const double side = .75 * std::min(width, height);
+mat4 middle_viewport(int width, int height, double zoom) {
+    const double side = .75 * std::min(width, height) * zoom;
     return viewport((width - side) / 2, (height - side) / 2, side, side);
 }
 

@@ -25,7 +25,8 @@ constexpr double screen_depth = 2000;  // what the viewport makes of the z range
 mat4 lookat(const vec3& eye, const vec3& center, const vec3& up);
 
 // Central projection onto the plane z = 0 for an eye at z = -1/c: the identity with c at row 3, column 2, so w = 1 + c
-// z. c = 0 is the orthographic camera.
+// z. c = 0 is the orthographic camera. What lies in that plane keeps its size however near the eye is, and a nearer eye
+// only bends what is before and behind it more: to see a scene larger, zoom.
 mat4 projection(double c);
 
 mat4 translation(const vec3& by);
@@ -33,8 +34,8 @@ mat4 translation(const vec3& by);
 // Takes [-1,1]^3 to [x,x+w] x [y,y+h] x [0,screen_depth]; x, y, w, h in pixels.
 mat4 viewport(double x, double y, double w, double h);
 
-// [-1,1]^2 in the middle three quarters of the shorter side of a picture, so that nothing is stretched.
-mat4 middle_viewport(int width, int height);
+// [-1,1]^2 in the middle three quarters of the shorter side of a picture, so that nothing is stretched; times zoom.
+mat4 middle_viewport(int width, int height, double zoom = 1);
 
 // A camera is a value, so that two passes and several lights can live side by side.
 struct Camera {

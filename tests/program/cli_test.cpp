@@ -66,7 +66,7 @@ TEST("a wrong command line ends with status 2 and one line") {
         {"--shadow-size", {"0", "-1", "16385", "x", "1.5"}}, {"--eye", no_vectors}, {"--center", no_vectors},
         {"--up", no_vectors}, {"--light", joined(no_vectors, {"0,0,0"})}, {"--bias", {"x", "1x", "nan", "inf"}},
         {"--shadow", {"soft", "Map", "maps", "''"}}, {"--draw", {"depth", "colour", "Normal", "''"}},
-        {"--threads", {"-1", "257", "all"}}};
+        {"--zoom", {"0", "-1", "9e-7", "1.1e6", "nan", "x", "''"}}, {"--threads", {"-1", "257", "all"}}};
     for (const auto& [option, values] : wrong_values) {
         check(option + ": a value is missing", {option, option + " --quiet"});
         check(option, joined(each(option + " %", values), each(option + "=%", values)));
@@ -209,6 +209,17 @@ TEST("--only: one of the two pictures, without what it does not need") {
     CHECK(frame.frame == both.frame && frame.depth.empty());
     CHECK(depth.depth == both.depth && depth.frame.empty() && value(depth.out, "fragments") == 0);
     CHECK_EQ(Folder().run(small + "--only depth --shadow exact").status, 2);
+}
+
+TEST("--zoom: the middle of a picture twice as large, and the same light") {
+    const Folder near, far;
+    const Outcome zoomed = near.run("--size 100x80 --zoom 2"), whole = far.run("--size 200x160");
+    const TGAImage large = TGAImage::read_tga_file(far / "framebuffer.tga");
+    near.each_pixel([&](int x, int y, const std::uint8_t* bgr) {
+        for (int c = 0; c < 3; c++) CHECK_EQ(int{bgr[c]}, int{large.pixel(x + 50, y + 40)[c]});
+    });
+    CHECK(zoomed.depth == whole.depth && near.run("--size 200x160 --zoom=1").frame == whole.frame);
+    for (const std::string zoom : {"1e6", "1e-6"}) CHECK_EQ(near.run("--size 9 --zoom " + zoom).status, 0);
 }
 
 // A wall at z = 0 that faces viewer and light, a board before it that shadows a part of it, and a strip that turns its

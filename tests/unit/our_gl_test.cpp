@@ -370,6 +370,12 @@ TEST("integer powers") {
     }
 }
 
+TEST("the middle viewport: three quarters of the shorter side, times zoom, about the middle") {
+    const vec4 corner{1, -1, 1, 1};
+    CHECK(middle_viewport(800, 400) * corner == (vec4{550, 50, screen_depth, 1}));
+    CHECK(middle_viewport(400, 800, .5) * corner == (vec4{275, 325, screen_depth, 1}));
+}
+
 TEST("depth as a picture: nearest white, nothing black") {
     DepthBuffer z(3, 1);
     z.row(0)[0] = 500, z.row(0)[1] = 1000, z.row(0)[2] = -INFINITY;
