@@ -25,8 +25,8 @@ static std::string copy_of(const Model& model, const vec3& n) {
 Scene::Scene(const Strings& arguments, const Folder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
-    for (const char* option : {"-o", "--size", "--shadow-size", "--eye", "--center", "--up", "--light", "--shadow",
-                               "--bias", "--draw", "--only", "--threads", "--frames"})
+    for (const char* option : {"-o", "--output", "--size", "--shadow-size", "--eye", "--center", "--up", "--zoom",
+                               "--light", "--shadow", "--bias", "--draw", "--only", "--threads", "--frames"})
         values[option];
     bool fits = true;
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
@@ -36,7 +36,8 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
         if (*arg == "--no-fit") fits = false;
         if (option != values.end()) towards_light.push_back(option->second = *++arg);
     }
-    std::sscanf(values["--size"].c_str(), "%dx%d", &view.width, &view.height);
+    if (std::sscanf(values["--size"].c_str(), "%d%*[xX]%d", &view.width, &view.height) == 1) view.height = view.width;
+    std::sscanf(values["--zoom"].c_str(), "%lf", &view.zoom);
     std::sscanf(values["--threads"].c_str(), "%d", &threads);
     for (const auto& [option, v] : {std::pair("--eye", &view.eye), {"--center", &view.center}, {"--up", &view.up},
                                     {"--light", &light}})

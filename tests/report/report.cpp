@@ -166,7 +166,12 @@ void make_table(const Program& umbra, Strings scene) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-    const Strings arguments(argv + 1, argv + argc);
+    Strings arguments;
+    for (const std::string& argument : Strings(argv + 1, argv + argc)) {  // --name=value as two
+        const std::size_t equals = argument.starts_with("--") ? argument.find('=') : argument.npos;
+        arguments.push_back(argument.substr(0, equals));
+        if (equals != argument.npos) arguments.push_back(argument.substr(equals + 1));
+    }
     const auto given = [&](const char* option) {
         return std::find(arguments.begin(), arguments.end(), option) != arguments.end();
     };

@@ -93,7 +93,7 @@ vec3 View::direction(int px, int py) const {
     if (!(norm(x) > 0)) x = normalized(cross(least_axis(z), z));
     const vec3 y = cross(z, x);
     if (!(norm(x) > 0 && norm(y) > 0)) throw std::invalid_argument("a view without a direction");
-    const double side = .75 * std::min(width, height);
+    const double side = .75 * std::min(width, height) * zoom;
     return (center - eye) + x * ((2 * px + 1 - width) / side) + y * ((2 * py + 1 - height) / side);
 }
 

@@ -25,6 +25,7 @@ using Triangle = std::array<vec3, 3>;  // counter-clockwise where its front is s
 struct View {
     vec3 eye{1, 1, 4}, center{}, up{0, 1, 0};
     int width = 800, height = 800;
+    double zoom = 1;
 
     // From the eye through the centre of the pixel (px,py), (0,0) at the bottom left; its length takes it to the plane
     // through `center`. Throws std::invalid_argument where eye = center.
