@@ -18,7 +18,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     int shadow_size = 800;          // of the shadow buffer, in pixels a side
     vec3 light_dir{1, 1, 0};        // towards the light
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
-    double zoom = 1;
+    double zoom = 1;  // about the middle of the picture
     enum class Method { map, exact, off } method = Method::map;  // of shadows
     std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
@@ -45,6 +45,7 @@ struct DepthShader final : IShader {  // only the z-buffer is wanted: there is n
 struct Shadow {  // what the first pass leaves for the second
     Options::Method method = Options::Method::off;  // off, too, where nothing can throw a shadow onto what is seen
     mat4 M = mat4::identity();  // Viewport*Projection*ModelView of the light: from object space to its screen
+    double aspect = 1;          // of a texel: how much wider it is than high
     DepthBuffer shadowbuffer;   // what is nearest to the light there ...
     LightGrid grid;             // ... or, for exact shadows, all faces
 };
@@ -169,6 +170,7 @@ static void first_pass(const Options& opt, const Models& casters, Shadow& shadow
     Camera light{lookat(opt.light_dir, opt.center, opt.up), projection(0), middle_viewport(size, size)};
     if (!classic) light = fitted(light, casters, size);
     shadow.M = light.to_screen();
+    shadow.aspect = light.Projection[1][1] / light.Projection[0][0];
     if (exact) {
         shadow.grid = LightGrid(casters, light, size);
         return;
@@ -384,7 +386,7 @@ static std::string write(const Options& opt, const Shadow& shadow, const TGAImag
     std::optional<TGAFile> files[2];
     parallel_for(2, [&](int i, int) {
         if (i == 0 && shadow.shadowbuffer.width() && opt.only != Options::Only::framebuffer)
-            files[i].emplace(depth_picture(shadow.shadowbuffer), paths[i]);
+            files[i].emplace(depth_picture(shadow.shadowbuffer, shadow.aspect), paths[i]);
         if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, paths[i]);
     });
     for (auto& file : files)

@@ -169,7 +169,7 @@ DepthBuffer::DepthBuffer(int width, int height) : w_(width), h_(height), stride_
     cells_ = std::make_unique_for_overwrite<float[]>(std::size_t{1} * stride_ * h_);
 }
 
-TGAImage depth_picture(const DepthBuffer& depths) {
+TGAImage depth_picture(const DepthBuffer& depths, double aspect) {
     constexpr double darkest = 32, white = 255;
     float far = -DepthBuffer::nothing, near = DepthBuffer::nothing;
     for (int y = 0; y < depths.height(); y++)
@@ -177,11 +177,18 @@ TGAImage depth_picture(const DepthBuffer& depths) {
             if (const float z = depths.row(y)[x]; z != DepthBuffer::nothing)
                 far = std::min(far, z), near = std::max(near, z);
     const double scale = near > far ? (white - darkest) / (double{near} - double{far}) : 0;
-    TGAImage picture(depths.width(), depths.height(), TGAImage::GRAYSCALE);
-    for (int y = 0; y < depths.height(); y++)
-        for (int x = 0; x < depths.width(); x++)
-            if (const float z = depths.row(y)[x]; z != DepthBuffer::nothing)
-                *picture.pixel(x, y) = static_cast<std::uint8_t>(white - scale * (double{near} - double{z}));
+    const int w = depths.width(), h = depths.height();
+    // What is flat as the light sees it has no aspect to speak of: a column or row of it is left.
+    const int columns = std::max(1, static_cast<int>(w * std::min(1., aspect) + .5));
+    const int rows = std::max(1, static_cast<int>(h * std::min(1., 1 / aspect) + .5));
+    TGAImage picture(w, h, TGAImage::GRAYSCALE);
+    for (int y = 0; y < rows; y++)
+        for (int x = 0; x < columns; x++) {  // the cell in which the pixel's centre lies
+            const float z = depths.row((2 * y + 1) * h / (2 * rows))[(2 * x + 1) * w / (2 * columns)];
+            std::uint8_t& pixel = *picture.pixel((w - columns) / 2 + x, (h - rows) / 2 + y);
+            if (z != DepthBuffer::nothing)
+                pixel = static_cast<std::uint8_t>(white - scale * (double{near} - double{z}));
+        }
     return picture;
 }
 

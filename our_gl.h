@@ -110,8 +110,9 @@ private:
     std::unique_ptr<float[]> cells_;
 };
 
-// The depths as a grey picture: the nearest is white, the farthest a dark grey, and what was not drawn is black.
-TGAImage depth_picture(const DepthBuffer& depths);
+// The depths as a grey picture: the nearest is white, the farthest a dark grey, and what was not drawn is black. Cells
+// that are aspect times as wide as high come out square: the picture has the buffer's size, and black at two sides.
+TGAImage depth_picture(const DepthBuffer& depths, double aspect = 1);
 
 // ---- shaders ----
 

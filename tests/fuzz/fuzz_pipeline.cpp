@@ -108,7 +108,7 @@ void check(const Drawing& d, long faces) {
             REQUIRE(d.face(x, y) >= -1 && d.face(x, y) < faces && (d.face(x, y) >= 0) == d.drawn(x, y));
         }
     }
-    depth_picture(d.z);
+    for (const double aspect : {1., .3, 1e300}) depth_picture(d.z, aspect);
     const Counters& count = d.count;
     REQUIRE(count.triangles == faces);
     REQUIRE(count.outside >= 0 && count.between_samples >= 0 && count.outside + count.between_samples <= faces);

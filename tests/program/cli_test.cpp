@@ -222,6 +222,24 @@ TEST("--zoom: the middle of a picture twice as large, and the same light") {
     for (const std::string zoom : {"1e6", "1e-6"}) CHECK_EQ(near.run("--size 9 --zoom " + zoom).status, 0);
 }
 
+// Boards that face the light: the one of half the height fills the middle half of the rows.
+TEST("depth.tga shows the scene unstretched; what is all but a line to the light is a row or column of it") {
+    const Folder f;
+    for (const auto& [height, rows] : {std::pair(".5", 15), {"1", 30}, {"1e-3", 1}, {"1e-300", 1}}) {
+        f.write("m.obj", each("v -1 -% 0\nv 1 -% 0\nv 1 % 0\nv -1 % 0\nf 1 2 3 4\n", {height})[0]);
+        for (const std::string up : {"0,1,0", "1,0,0"}) {
+            CHECK_EQ(f.run(small + "--no-fit --light 0,0,1 --up " + up + " m.obj").status, 0);
+            int drawn = 0;
+            f.each_pixel([&, n = rows](int x, int y, const std::uint8_t* grey) {
+                const int from_middle = std::abs(2 * (up == "0,1,0" ? y : x) - 29);  // in half pixels
+                CHECK(*grey == 0 || from_middle <= n);
+                drawn += *grey > 0;
+            }, "depth.tga");
+            CHECK_EQ(drawn, 30 * rows);
+        }
+    }
+}
+
 // A wall at z = 0 that faces viewer and light, a board before it that shadows a part of it, and a strip that turns its
 // back to both. The light comes from the right at 45 degrees.
 TEST("--draw shadow: lit is white, in shadow black, turned away from the light grey") {

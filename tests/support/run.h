@@ -76,9 +76,9 @@ struct Folder : TemporaryFolder {
         return run_command("cd \"" + path().string() + "\" && " + program + ' ' + arguments);
     }
 
-    // Calls visit(x, y, bgr) for each pixel of framebuffer.tga and returns how many there are.
-    long each_pixel(const auto& visit) const {
-        const TGAImage image = TGAImage::read_tga_file(*this / "framebuffer.tga");
+    // Calls visit(x, y, bgr) for each pixel of the picture and returns how many there are.
+    long each_pixel(const auto& visit, const std::string& picture = "framebuffer.tga") const {
+        const TGAImage image = TGAImage::read_tga_file(*this / picture);
         for (int y = 0; y < image.height(); y++)
             for (int x = 0; x < image.width(); x++) visit(x, y, image.pixel(x, y));
         return long{image.width()} * image.height();

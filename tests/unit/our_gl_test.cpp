@@ -387,6 +387,28 @@ TEST("depth as a picture: nearest white, nothing black") {
     CHECK_EQ(int{depth_picture(z).get(0, 0)[0]}, 255);
 }
 
+// Cells of all depths from 0 to 63, so that a pixel tells whose it is.
+TEST("depth as a picture: cells that are not square come out square, in the middle") {
+    DepthBuffer z(8, 8);
+    for (int i = 0; i < 64; i++) z.row(i / 8)[i % 8] = static_cast<float>(i);
+    const auto pixel = [&](const TGAImage& p, int x, int y) {
+        const int grey = *p.pixel(x, y);
+        return grey ? static_cast<int>(std::lround((grey - 32) * 63 / 223.)) : -1;
+    };
+    const TGAImage narrow = depth_picture(z, .5), flat = depth_picture(z, 4);
+    for (int i = 0; i < 64; i++) {
+        const int x = i % 8, y = i / 8;
+        CHECK_EQ(pixel(narrow, x, y), x < 2 || x > 5 ? -1 : 8 * y + 2 * (x - 2) + 1);
+        CHECK_EQ(pixel(flat, x, y), y < 3 || y > 4 ? -1 : 8 * (4 * (y - 3) + 2) + x);
+    }
+    for (const double aspect : {0., 1e-300, 1e300, std::numeric_limits<double>::infinity()}) {
+        const TGAImage line = depth_picture(z, aspect);
+        int drawn = 0;
+        for (int i = 0; i < 64; i++) drawn += *line.pixel(i % 8, i / 8) > 0;
+        CHECK_EQ(drawn, 8);
+    }
+}
+
 // Acne is a face that shadows itself. A face alone in the buffer is looked up at random points of it, at all its
 // slopes.
 TEST("with the derived bias no face shadows itself, with a half of it some do") {
