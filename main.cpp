@@ -8,10 +8,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
+#if __has_include(<sys/ioctl.h>)
+#include <sys/ioctl.h>
+#endif
 
 struct Options {  // the lesson's scene; the command line can change each of these
     int width = 800, height = 800;  // of the picture, in pixels
@@ -25,7 +29,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     std::vector<std::filesystem::path> models;
     std::filesystem::path out = ".";
     enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
-    bool own_light = false, tangent = false, fit = true, quiet = false, help = false, version = false;
+    bool own_light = false, tangent = false, fit = true, show = false, quiet = false, help = false, version = false;
     int threads = 0, frames = 1;  // 0: all processors
 };
 
@@ -282,6 +286,7 @@ static const Option options[] = {
      [](Options& o, const Value& v) { v.read(o.threads, 256, 0); }},
     {"--frames", "N", "draw N times and tell the median time of each pass (1)",
      [](Options& o, const Value& v) { v.read(o.frames, 9999); }},
+    {"--show", "", "print the picture in the terminal, too", [](Options& o, const Value&) { o.show = true; }},
     {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }, "-q"},
     {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }, "-h"},
     {"--version", "", "print the version", [](Options& o, const Value&) { o.version = true; }, "-V"},
@@ -428,6 +433,38 @@ static std::string missing_maps(const std::vector<Model>& models) {
     return names;
 }
 
+// Prints the picture, averaged down to the terminal's width: a character is two pixels, one above the other.
+static void show(const TGAImage& picture) {
+    const char* const wide = std::getenv("COLUMNS");
+    int columns = wide ? std::atoi(wide) : 0;
+#ifdef TIOCGWINSZ
+    if (winsize size{}; ioctl(1, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) columns = size.ws_col;
+#endif
+    const int w = std::min(columns > 0 ? columns : 80, picture.width());
+    const int h = std::max(1, w * picture.height() / picture.width());
+    const auto average = [&](int x, int y) {  // ";RED;GREEN;BLUE" of the pixels that come together there
+        const int left = x * picture.width() / w, right = (x + 1) * picture.width() / w;
+        const int low = y * picture.height() / h, high = (y + 1) * picture.height() / h;
+        std::string text;
+        for (const int c : {2, 1, 0}) {
+            long long sum = 0;
+            for (int i = low; i < high; i++)
+                for (int j = left; j < right; j++) sum += picture.pixel(j, i)[picture.bytespp() == 1 ? 0 : c];
+            text += ';' + std::to_string(sum / ((right - left) * (high - low)));
+        }
+        return text + 'm';
+    };
+    for (int y = h - 1; y >= 0; y -= 2) {
+        std::string line;
+        for (int x = 0; x < w; x++) {
+            line += "\033[38;2" + average(x, y);
+            if (y > 0) line += "\033[48;2" + average(x, y - 1);
+            line += "\u2580";  // the upper half of a block, over the background's colour
+        }
+        std::puts((line + "\033[0m").c_str());
+    }
+}
+
 static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -465,7 +502,10 @@ static void run(Options opt) {
     const double drawn = milliseconds();
     const std::string pictures = write(opt, shadow, frame);
     const double written = milliseconds();
-    note_darkness(opt, frame, opt.only == Options::Only::depth ? !scene.casters.empty() : c.shaded > 0);
+    const bool only_depth = opt.only == Options::Only::depth;
+    const bool is_seen = only_depth ? !scene.casters.empty() : c.shaded > 0;
+    if (opt.show && is_seen) only_depth ? show(depth_picture(shadow.shadowbuffer, shadow.aspect)) : show(frame);
+    note_darkness(opt, frame, is_seen);
     if (opt.quiet) return;
     const std::string left_out = missing_maps(scene.models) + (scene.casters.empty() ? ",shadow" : "");
     if (!pictures.empty()) std::printf("wrote %s\n", pictures.c_str());

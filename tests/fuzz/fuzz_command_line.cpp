@@ -36,7 +36,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (status != 1) return 0;
 
     // ... and what is accepted draws the model: the last value of an option counts. After -- there are models alone.
-    static const std::set<std::string> flags{"--tangent", "--no-fit", "--quiet", "-q"};
+    static const std::set<std::string> flags{"--tangent", "--no-fit", "--show", "--quiet", "-q"};
     std::vector<std::string> drawing;
     for (std::size_t i = 0; i < words.size() && words[i] != "--"; i++) {
         drawing.push_back(words[i]);

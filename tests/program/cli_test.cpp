@@ -240,6 +240,32 @@ TEST("depth.tga shows the scene unstretched; what is all but a line to the light
     }
 }
 
+// Two boards that fill a picture of 4 x 3: one turned away from the light, and below it one that faces it.
+TEST("--show: two pixels in a character, averaged down to the terminal's width") {
+    const Folder f;
+    f.write("m.obj", "v -9 0 0\nv 9 0 0\nv 9 9 0\nv -9 9 0\nv 9 -9 0\nv -9 -9 0\nvn 1 0 0\nvn 0 0 1\n"
+                     "f 1//1 2//1 3//1 4//1\nf 6//2 5//2 2//2 1//2\n");
+    const std::string options = "--no-fit --eye 0,0,4 --light 0,0,1 --show --only framebuffer m.obj ";
+    const auto shown = [&](const std::string& columns, const std::string& more) {
+        const std::string out = f.run(options + more, "COLUMNS=" + columns + ' ' + umbra_command).out;
+        return std::regex_replace(out.substr(0, out.find("wrote")), std::regex("\033\\["), "<");
+    };
+    const auto times = [](int n, const std::string& text) {
+        std::string all;
+        for (int i = 0; i < n; i++) all += text;
+        return all;
+    };
+    const std::string dark = "20;20;20m", light = "255;255;255m", block = "\u2580";
+    const std::string two = "<38;2;" + dark + "<48;2;" + light + block;
+    CHECK_EQ(shown("80", "--size 4x2"), times(4, two) + "<0m\n");
+    CHECK_EQ(shown("3", "--size 6x4"), times(3, two) + "<0m\n");
+    CHECK_EQ(shown("2", "--size 4"), times(2, two) + "<0m\n");
+    CHECK_EQ(shown("1", "--size 4"), "<38;2;137;137;137m" + block + "<0m\n");  // of 20 and 255
+    CHECK_EQ(lines(shown("x", "--size 200")), 40);
+    CHECK_EQ(lines(f.run(options + "--size 8 --quiet").out), 4);
+    CHECK_EQ(lines(f.run(small + "--show --only depth").out), 15 + 2);
+}
+
 // A wall at z = 0 that faces viewer and light, a board before it that shadows a part of it, and a strip that turns its
 // back to both. The light comes from the right at 45 degrees.
 TEST("--draw shadow: lit is white, in shadow black, turned away from the light grey") {
