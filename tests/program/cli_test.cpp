@@ -97,6 +97,8 @@ TEST("the command line as people type it") {
     for (const auto& [brief, name] : std::map<std::string, std::string>{{"-h", "--help"}, {"-V", "--version"}})
         CHECK(f.run(brief).out == f.run(name).out);
     CHECK(f.run(small + "-q m.obj").out.empty());
+    CHECK(f.run(small + "- <m.obj").same_pictures(f.run(small + "m.obj")));
+    CHECK_EQ(f.run(small + "- </dev/null").err, "umbra: -: no faces\n");
     CHECK(f.run("-- --help").err.rfind("umbra: --help: ", 0) == 0);  // a model
 }
 
@@ -111,7 +113,7 @@ TEST("the folder of the pictures is made") {
 TEST("a file that is missing or no model is one line that names it, status 1, and earlier pictures as they were") {
     const Folder f;
     f.write("good.obj", triangle);
-    f.write("few.obj", "v 0 0 0\nf 1 1\n");
+    f.write("few.obj", "v 0 0 0\nf 1 1 2\n");
     f.write("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
     f.write("map.obj", triangle + "vt 0 0\nf 1/1 2/1 3/1\n");
     f.write("map_diffuse.tga", "this is a text where a picture should be, long enough for a header");
@@ -137,11 +139,14 @@ TEST("a standard output that takes nothing is one error line") {
     for (const std::string option : {"--help", "--version"}) CHECK(f.run(option + " >/dev/full").status != 0);
 }
 
-TEST("one line says that a model was fitted, none with --no-fit") {
+TEST("one line says that a scene was fitted and how it is lit, none with --no-fit") {
     const Folder f;
     f.write("big.obj", "v -10 -10 0\nv 10 -10 0\nv 0 10 0\nf 1 2 3\n");
     const Outcome fitted = f.run(small + "big.obj"), kept = f.run(small + "--no-fit big.obj");
-    CHECK(fitted.status == 0 && lines(fitted.err) == 1 && fitted.err.find("fitted") != std::string::npos);
+    CHECK_EQ(fitted.err, "umbra: the scene is fitted to the picture (--no-fit)\n");
+    const Outcome lit = f.run("--size 40x40 --shadow-size 30 big.obj");  // small has a light
+    CHECK_EQ(lit.err, "umbra: the scene is fitted to the picture and lit from 1,1,1 (--no-fit, --light X,Y,Z)\n");
+    CHECK(lit.same_pictures(fitted));
     CHECK(kept.status == 0 && kept.err.empty() && kept.frame != fitted.frame);
     const Outcome quiet = f.run(small + "--quiet big.obj");
     CHECK(quiet.err.empty() && quiet.out.empty() && quiet.frame == fitted.frame);
@@ -266,13 +271,40 @@ TEST("--show: two pixels in a character, averaged down to the terminal's width")
     CHECK_EQ(lines(f.run(small + "--show --only depth").out), 15 + 2);
 }
 
+// A wall that faces viewer and light, in one colour: 20 + 1.2 * 255 times what its surface reflects, and its glow.
+TEST("a wall's colour: vertices' times Kd times the map's, and Ke; without normals also from behind") {
+    const Folder f;
+    TGAImage halves(2, 1, TGAImage::RGB);
+    halves.set(0, 0, {{100, 100, 100, 0}});
+    halves.write_tga_file(f / "halves.tga");  // the right one is black
+    f.write("m.mtl", "newmtl plain\nnewmtl red\nKd 1 .5 0\nKe 0 .1 .2\nnewmtl left\nmap_Kd -s .5 1 halves.tga\n"
+                     "newmtl shifted\nmap_Kd -s .5 1 -o .5 0 halves.tga\n");
+    const std::string front = "f 1/1 2/2 3/3 4/4\n", normal = "vn 0 0 -1\n";
+    const auto check = [&](const std::string& colors, const std::string& rest, const Bytes& bgr) {
+        std::string obj = "mtllib m.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+        for (const std::string corner : {"-1 -1", "1 -1", "1 1", "-1 1"}) obj += "v " + corner + " 0" + colors + '\n';
+        f.write("m.obj", obj + rest);
+        f.run("--no-fit --size 8x8 --eye 0,0,4 --light 0,0,1 m.obj");
+        f.each_pixel([&](int x, int y, const std::uint8_t* pixel) {
+            if (std::min({x, y, 7 - x, 7 - y}) > 0) CHECK(Bytes(pixel, pixel + 3) == bgr);
+        });
+    };
+    check("", "usemtl plain\n" + front, {255, 255, 255});
+    check(" .1 .5 .25", "usemtl plain\n" + front, {96, 173, 50});
+    check(" .5 .5 .25", "usemtl red\n" + front, {71, 122, 173});
+    check("", "usemtl left\n" + front, {140, 140, 140});
+    check("", "usemtl shifted\n" + front, {20, 20, 20});
+    check(" .1 .5 .25", "usemtl plain\nf 4 3 2 1\n", {96, 173, 50});
+    check("", normal + "usemtl plain\nf 1//1 2//1 3//1 4//1\n", {20, 20, 20});
+}
+
 // A wall at z = 0 that faces viewer and light, a board before it that shadows a part of it, and a strip that turns its
 // back to both. The light comes from the right at 45 degrees.
 TEST("--draw shadow: lit is white, in shadow black, turned away from the light grey") {
     const Folder f;
     f.write("wall.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"
                         "v -.25 -.26 .25\nv .25 -.26 .25\nv .25 .26 .25\nv -.25 .26 .25\nf 5 6 7 8\n"
-                        "v -1.24 -1 0\nv -1.1 -1 0\nv -1.1 1 0\nv -1.24 1 0\nf 12 11 10 9\n");
+                        "v -1.24 -1 0\nv -1.1 -1 0\nv -1.1 1 0\nv -1.24 1 0\nvn 0 0 -1\nf 12//1 11//1 10//1 9//1\n");
     for (const std::string shadow : {"exact", "off"}) {
         f.run("--size 80x80 --no-fit --eye 0,0,4 --light 1,0,1 --draw shadow wall.obj --shadow " + shadow);
         const long pixels = f.each_pixel([&](int px, int py, const std::uint8_t* bgr) {

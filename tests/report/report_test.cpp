@@ -9,6 +9,7 @@
 #include "chart.h"
 #include "check.h"
 #include "judge.h"
+#include "our_gl.h"
 #include "prediction.h"
 #include "random.h"
 
@@ -96,11 +97,14 @@ TEST("the scene is read from umbra's arguments, and a copy of each model turns i
     CHECK(scene.view.width == 30 && scene.view.height == 20 && scene.light == (vec3{0, 3, 4}));
     CHECK(scene.view.eye == (vec3{1, 2, 2}) && scene.view.center == vec3{} && scene.view.up == (vec3{0, 1, 0}));
     CHECK(scene.paths == Strings{path});
-    CHECK_NEAR(norm(scene.models.at(0).vert(0, 1) - vec3{1, -.5, -1.025}), 0, 1e-15);
+    std::vector<Model> fitted(1, Model(path));
+    CHECK(fit(fitted));
+    CHECK(scene.models.at(0).vert(0, 1) == (fitted[0].vert(0, 1) - vec3{0, 0, 1}));
     CHECK_EQ(scene.towards_light.size(), given.size() + 2);
     const Model copy(scene.towards_light.back()), original(path);
     for (int c = 0; c < 3; c++) CHECK(copy.vert(0, c) == original.vert(0, c) && copy.normal(0, c) == (vec3{0, .6, .8}));
     CHECK(scene.view.zoom == 2 && Scene({"--size", "7", path}, folder).view.height == 7);
+    CHECK(Scene({path}, folder).light == (vec3{1, 1, 1}));
     CHECK(Scene({"--no-fit", path}, folder).models.at(0).vert(0, 1) == (vec3{10, 0, 0}));
 }
 TEST("the frontier is what no other method beats, and of equals both") {
