@@ -3,19 +3,13 @@
 // found in the wild: what is clear is read, and what is not is an error with its line.
 #include "model.h"
 
-#include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <deque>
-#include <fstream>
 #include <future>
-#include <map>
-#include <memory>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string_view>
 #include <thread>
 
@@ -39,15 +33,10 @@ std::string in_quotes(std::string_view text) {
     return "'" + out + (text.size() > 60 ? "...'" : "'");
 }
 
-// Of each kind of thing there is one note: of the first one, and how many there are.
-using Notes = std::vector<Model::Note>;
-Model::Note* find(Notes& notes, const std::string& what) {
-    const auto note = std::find_if(notes.begin(), notes.end(), [&](const Model::Note& n) { return n.what == what; });
-    return note == notes.end() ? nullptr : &*note;
-}
-void add(Notes& notes, const Model::Note& note) {
-    if (Model::Note* const same = find(notes, note.what)) same->count += note.count;
-    else notes.push_back(note);
+void add(Model::Notes& notes, const std::string& what, const std::string& which, int count = 1) {
+    Model::Note& note = notes[what];
+    if (note.count == 0) note.first = which;
+    note.count += count;
 }
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -92,11 +81,9 @@ FileBytes read_text(const fs::path& path) {
     };
     for (const auto& [bytes, kind] : other_files)
         if (all.starts_with(bytes)) refuse(kind);
-    if (all.size() >= 84) {  // or STL that is not text: 80 bytes, the number of faces, 50 bytes for each
-        std::uint32_t n;
-        std::memcpy(&n, &all[80], 4);
-        if (all.size() == 84 + 50 * std::uint64_t{n}) refuse("STL");
-    }
+    std::uint32_t faces = 0;  // of STL that is not text: 80 bytes, the number of faces, 50 bytes for each
+    if (all.size() >= 84) std::memcpy(&faces, &all[80], 4);
+    if (all.size() == 84 + 50 * std::uint64_t{faces}) refuse("STL");
     if (all.empty() || all.back() != '\n') *text.end++ = '\n';
     if (find('\0', text.begin, text.end)) refuse("binary");
     if (all.starts_with("\xEF\xBB\xBF")) text.begin += 3;  // UTF-8's byte order mark
@@ -109,7 +96,7 @@ FileBytes read_text(const fs::path& path) {
 class Scanner {
 public:
     Scanner(const fs::path& name, const FileBytes& text)
-        : name_(name), begin_(text.begin), at_(text.begin), end_(text.end) {}
+        : begin_(text.begin), at_(text.begin), end_(text.end), name_(name) {}
 
     bool is_done() const { return at_ == end_; }
     void next_line() { at_ = (*at_ == '\n' ? at_ : find('\n', at_, end_)) + 1; }
@@ -117,15 +104,6 @@ public:
         while (is_blank(*at_)) at_++;
         return *at_ == '\n' || *at_ == '#';
     }
-    const char* position() const { return at_; }
-    void go_back(const char* position) { at_ = position; }
-    char peek() const { return *at_; }
-    bool skip(char c) {
-        if (*at_ != c) return false;
-        at_++;
-        return true;
-    }
-    bool at_word_end() const { return ends_word(*at_); }
     std::string_view peek_word() {  // empty at the end of the statement
         at_end();
         const char* end = at_;
@@ -170,21 +148,23 @@ public:
         const char* p = at_;
         for (; is_digit(*p) && p < at_ + 9; p++) small = small * 10 + (*p - '0');
         if (p > at_ && !is_digit(*p)) return at_ = p, small;
-        std::int64_t value = 0;
+        int value = 0;
         const auto [end, error] = std::from_chars(after_plus(), end_, value);
-        if (error != std::errc() || std::abs(value) > INT32_MAX) fail_word(what);
+        if (error != std::errc()) fail_word(what);
         at_ = end;
-        return static_cast<int>(value);
+        return value;
     }
 
-    void note(Notes& notes, const char* what) const {
-        if (Model::Note* const same = find(notes, what)) same->count++;  // its place need not be found
-        else notes.push_back({what, name_.filename().string() + ':' + line()});
+    void note(Model::Notes& notes, const char* what) const {  // the place is looked for only once
+        add(notes, what, notes.contains(what) ? "" : name_.filename().string() + ':' + line());
     }
     [[noreturn]] void fail_word(const char* what) { fail(in_quotes(peek_word()) + " is no " + what); }
     [[noreturn]] void fail(const std::string& what) {
         throw std::runtime_error(name_.string() + ':' + line() + ": " + what);
     }
+
+protected:
+    const char *begin_, *at_, *end_;
 
 private:
     const char* after_plus() const { return at_ + (*at_ == '+' && at_[1] != '-'); }
@@ -194,7 +174,6 @@ private:
     }
 
     fs::path name_;
-    const char *begin_, *at_, *end_;
 };
 
 // ---- the .obj ----
@@ -203,22 +182,15 @@ private:
 // polygon are a fan, to be cut better.
 class Obj : Scanner {
 public:
-    struct Polygon {
-        int face, corners;  // its first triangle, and how many corners it has: two more than triangles
-    };
-    struct Run {
-        int face;  // from this face on MATERIAL is used
-        std::string material;
-    };
     std::vector<vec3> verts, normals;
     std::vector<vec3> colors;  // of all vertices or of none
     std::vector<vec2> uvs;
     std::vector<Corner> corners;
-    std::vector<Polygon> polygons;
-    std::vector<Run> runs{{0, ""}};
+    std::vector<std::pair<int, int>> polygons;  // the first triangle, and how many corners: two more than triangles
+    std::vector<std::pair<int, std::string>> runs{{0, ""}};  // from this face on this material
     std::vector<int> groups;  // the smoothing group of each face, 0 for facets; or of none
     std::vector<std::string> libraries;
-    Notes notes;
+    Model::Notes notes;
     bool lacks_normals = false;  // some corner has none, or some normal has no length
 
     int nfaces() const { return static_cast<int>(corners.size() / 3); }
@@ -230,7 +202,7 @@ public:
         verts.reserve(bytes / 96), uvs.reserve(bytes / 96), normals.reserve(bytes / 96), corners.reserve(bytes / 32);
         const char* kept = text.begin;
         for (; !is_done(); next_line()) {
-            if (position() - kept > 1 << 24) text.forget_before(kept = position());  // else all of it is held at once
+            if (at_ - kept > 1 << 24) text.forget_before(kept = at_);  // else all of it is held at once
             if (skip_word("v")) vertex();
             else if (skip_word("vt")) uvs.push_back(vector<2>(1));
             else if (skip_word("vn")) normals.push_back(normalized(vector<3>(3)));
@@ -242,13 +214,13 @@ public:
         }
         if (std::find(normals.begin(), normals.end(), vec3{}) != normals.end()) lacks_normals = true;
         if (group_) groups.resize(nfaces(), *group_);
-        for (const Forward& f : forward_)
-            if (f.vert >= count(verts)) fail_vertex(f.position);
+        for (const auto& [position, vert] : forward_)
+            if (vert >= count(verts)) fail_vertex(position);
         for (Corner& c : corners) {
             const bool is_uv = c.uv < count(uvs) && c.uv >= -1, is_normal = c.normal < count(normals) && c.normal >= -1;
             if (is_uv && is_normal) continue;
-            add(notes, {"an index of a normal or texture coordinate that is not there, left out",
-                        "face " + std::to_string((&c - corners.data()) / 3 + 1)});
+            add(notes, "an index of a normal or texture coordinate that is not there, left out",
+                "face " + std::to_string((&c - corners.data()) / 3 + 1));
             if (!is_uv) c.uv = -1;
             if (!is_normal) c.normal = -1, lacks_normals = true;
         }
@@ -256,17 +228,10 @@ public:
     }
 
 private:
-    static constexpr int nowhere = INT_MIN;
-    struct Forward {  // a vertex that had not been defined yet: checked at the end
-        const char* position;
-        int vert;
-    };
-
     void vertex() {
         vec<6> v;  // the place, then a weight, or red, green and blue
         const int n = reals(v);
-        if (n < 3 && !at_end()) fail_word("finite number");
-        if (n < 3) fail("a vertex needs three coordinates");
+        if (n < 3) at_end() ? fail("a vertex needs three coordinates") : fail_word("finite number");
         if (!at_end()) note(notes, "a colour that is no number, left out");
         verts.push_back({v[0], v[1], v[2]});
         if (n != 6 && colors.empty()) return;
@@ -284,25 +249,23 @@ private:
         groups.resize(nfaces(), group_.value_or(0));
         group_ = static_cast<int>(std::strtol(rest().c_str(), nullptr, 10));
     }
-    // An index as written, from 1 or from the end of what has been defined so far, made one from 0.
+    // An index as written, from 1 or from the end of what has been defined so far, made one from 0; INT_MIN: nowhere.
     int index(const char* what, int defined) {
         const int i = integer(what);
-        return i > 0 ? i - 1 : i < 0 && i >= -defined ? defined + i : nowhere;
+        return i > 0 ? i - 1 : i < 0 && i >= -defined ? defined + i : INT_MIN;
     }
     [[noreturn]] void fail_vertex(const char* position) {
-        go_back(position);
-        const std::string i = std::to_string(integer(""));
-        fail("vertex index " + i + ": " + std::to_string(count(verts)) + " are defined, counted from 1");
+        at_ = position;
+        fail(in_quotes(peek_word()) + " is none of the " + std::to_string(count(verts)) + " vertices, counted from 1");
     }
     Corner corner() {  // v, v/vt, v//vn or v/vt/vn; v/ and v// are seen too
-        const char* const begin = position();
+        const char* const begin = at_;
         Corner c{index("vertex index", count(verts)), -1, -1};
         if (c.vert < 0) fail_vertex(begin);
         if (c.vert >= count(verts)) forward_.push_back({begin, c.vert});
-        const bool has_more = skip('/');
-        if (has_more && peek() != '/' && !at_word_end()) c.uv = index("texture index", count(uvs));
-        if (has_more && skip('/') && !at_word_end()) c.normal = index("normal index", count(normals));
-        if (!at_word_end()) fail("garbage after a number: " + in_quotes(peek_word()));
+        if (*at_ == '/' && *++at_ != '/' && !ends_word(*at_)) c.uv = index("texture index", count(uvs));
+        if (*at_ == '/' && !ends_word(*++at_)) c.normal = index("normal index", count(normals));
+        if (!ends_word(*at_)) fail("garbage after a number: " + in_quotes(peek_word()));
         if (c.normal < 0) lacks_normals = true;
         return c;
     }
@@ -321,7 +284,7 @@ private:
     }
 
     std::optional<int> group_;  // since there has been one
-    std::vector<Forward> forward_;
+    std::vector<std::pair<const char*, int>> forward_;  // vertices not yet defined where they are used
 };
 
 // ---- polygons ----
@@ -336,8 +299,7 @@ double area2(const vec2& a, const vec2& b, const vec2& c) {
 // Cuts polygons into triangles, always two fewer than corners, in the plane of the polygon's Newell normal: a fan where
 // that is right, and else ear clipping (G. H. Meisters, "Polygons have ears", 1975). An ear is a corner with a convex
 // angle whose triangle no reflex corner lies in; cutting it off changes only whether its two neighbours are ears. So n
-// corners are asked 3n times at most, and n are looked at each time: 3 max_corners looks a corner, whatever the file
-// holds. Measured with combs, spirals and stairs of 1000 corners, that is a microsecond a corner.
+// corners are asked 3n times at most, and n are looked at each time: 3 max_corners looks a corner, a microsecond.
 class PolygonCutter {
 public:
     // FAN holds the polygon (c0, c1, c2, ...) as the triangles (c0,c1,c2), (c0,c2,c3), ... and receives the triangles.
@@ -487,14 +449,14 @@ void make_normals(Obj& obj) {
         int faces = 0, normal = -1;  // the last is its index
     };
     std::vector<Sum> sums;
-    std::vector<int> parents;                  // a tree of corners for each smooth fan of faces
-    std::vector<std::pair<int, int>> edges;    // to that vertex, of that corner
+    std::vector<int> parents;                // a tree of corners for each smooth fan of faces
+    std::vector<std::pair<int, int>> edges;  // to that vertex, of that corner
     const auto root = [&](int j) {
         while (parents[j] != j) j = parents[j] = parents[parents[j]];
         return j;
     };
     for (int v = 0; v < count(obj.verts); v++) {
-        const int* const own = &around[first[v]];
+        const int* const own = around.data() + first[v];
         const int n = first[v + 1] - first[v];
         const auto solid = static_cast<int>(std::find_if_not(own, own + n, is_flat) - own);
         parents.resize(n), edges.clear();
@@ -504,11 +466,11 @@ void make_normals(Obj& obj) {
                 edges.push_back({obj.corners_of(own[j] / 3)[(own[j] + k) % 3].vert, j});
         }
         std::sort(edges.begin(), edges.end());
-        for (std::size_t e = 1; e < edges.size(); e++) {
-            const auto [to, j] = edges[e];
-            const auto [same, i] = edges[e - 1];
-            if (to == same && is_smooth(own[i] / 3, own[j] / 3)) parents[root(j)] = root(i);
-        }
+        for (int e = 1; e < count(edges); e++)  // where more than two faces meet, each may be smooth with another
+            for (int d = e - 1; d >= std::max(0, e - 8) && edges[d].first == edges[e].first; d--) {
+                const int i = edges[d].second, j = edges[e].second;
+                if (is_smooth(own[i] / 3, own[j] / 3)) parents[root(j)] = root(i);
+            }
         sums.assign(n, {});
         for (int j = 0; j < n; j++) {
             const Face& face = faces[own[j] / 3];
@@ -547,7 +509,7 @@ struct MtlMap {
 struct MtlMaterial {
     vec3 Kd{1, 1, 1}, Ke;
     MtlMap maps[map_count + 1];  // bump_map is for where there is no tangent_map
-    Notes notes;                 // for when it is used
+    Model::Notes notes;          // for when it is used
 };
 using Library = std::map<std::string, MtlMaterial>;
 
@@ -577,11 +539,6 @@ std::string take_options(std::string_view text, Map& map) {
     return std::string(text);
 }
 
-bool is_there(const fs::path& path) {
-    std::error_code ignored;
-    return fs::exists(path, ignored);
-}
-
 // The path of a file that is named in another one, be it beside that or beside what that is a link to; empty where
 // there is none. Programs of other systems write '\' for '/', the whole path on another machine, and other capitals:
 // where there is no file of that name, one is taken whose last part is the same in small letters.
@@ -592,7 +549,7 @@ fs::path found(const fs::path& from, std::string name) {
     std::error_code ignored;
     std::set<fs::path> places;
     for (const fs::path& folder : {from.parent_path(), fs::weakly_canonical(from, ignored).parent_path()}) {
-        if (is_there(folder / name)) return (folder / name).lexically_normal();
+        if (fs::exists(folder / name, ignored)) return (folder / name).lexically_normal();
         places.insert({folder, (folder / name).parent_path()});
     }
     fs::path best;
@@ -605,7 +562,7 @@ fs::path found(const fs::path& from, std::string name) {
 
 // The path of a picture that a file names, if it is a TGA file, or else of the TGA file of the same stem, or else
 // nothing, with a note. Other kinds are known by their first bytes, whatever the file's name.
-std::string picture(const fs::path& from, const std::string& name, Notes& notes) {
+std::string picture(const fs::path& from, const std::string& name, Model::Notes& notes) {
     std::string tga = fs::path(name).replace_extension(".tga").string(), kind;
     for (const std::string& each : {name, tga}) {
         const fs::path path = found(from, each);
@@ -613,9 +570,9 @@ std::string picture(const fs::path& from, const std::string& name, Notes& notes)
         if (other.empty() && lower(path.extension().string()) == ".tga") return path.string();
         if (!path.empty() && kind.empty()) kind = other + ":";
     }
-    if (kind.empty()) add(notes, {"a picture that is not there, left out", in_quotes(name)});
-    else add(notes, {"a picture that is not TGA, left out; to convert it",
-                     "convert " + in_quotes(kind == ":" ? name : kind + name) + " " + in_quotes(tga)});
+    if (kind.empty()) add(notes, "a picture that is not there, left out", in_quotes(name));
+    else add(notes, "a picture that is not TGA, left out; to convert it",
+             "convert " + in_quotes(kind == ":" ? name : kind + name) + " " + in_quotes(tga));
     return "";
 }
 
@@ -650,7 +607,7 @@ void read_mtl(const fs::path& path, Library& library) {
 }
 
 // Reads the files that the mtllib lines name: each line is one name, which may contain blanks, or else several.
-Library read_libraries(const fs::path& obj, const std::vector<std::string>& lines, Notes& notes) {
+Library read_libraries(const fs::path& obj, const std::vector<std::string>& lines, Model::Notes& notes) {
     Library library{{"", {}}};  // the default material
     std::set<fs::path> seen;
     const auto read = [&](std::string_view name) {
@@ -663,28 +620,29 @@ Library read_libraries(const fs::path& obj, const std::vector<std::string>& line
     for (const std::string& line : lines)
         for (std::string_view rest = read(line) ? std::string_view() : line; !rest.empty();)
             if (const std::string_view name = take_word(rest); !read(name))
-                add(notes, {"a material file that is not there", in_quotes(name)});
+                add(notes, "a material file that is not there", in_quotes(name));
     return library;
 }
 
 // Sorts the faces, stably, by material, and fills MATERIALS with those that faces use, in the order of their first
 // face. What the library does not define is all one default material, without a name.
 std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, std::vector<Material>& materials,
-                                            Notes& notes) {
+                                            Model::Notes& notes) {
     std::map<std::string, int> indices;
     std::set<std::string> unknown;
     std::vector<Model::Group> pieces, groups;
     obj.runs.push_back({obj.nfaces(), ""});
     for (int i = 0; i + 1 < count(obj.runs); i++) {
         auto& [begin, name] = obj.runs[i];
-        if (begin == obj.runs[i + 1].face) continue;
+        const int end = obj.runs[i + 1].first;
+        if (begin == end) continue;
         if (!library.contains(name)) {
-            if (unknown.insert(name).second) add(notes, {"a material that no file has", in_quotes(name)});
+            if (unknown.insert(name).second) add(notes, "a material that no file has", in_quotes(name));
             name.clear();
         }
         const auto [entry, is_new] = indices.emplace(name, count(materials));
         if (is_new) materials.push_back({name, library.at(name).Kd, library.at(name).Ke, {}, {}, {}, {}, {}});
-        pieces.push_back({begin, obj.runs[i + 1].face, entry->second});
+        pieces.push_back({begin, end, entry->second});
     }
     std::stable_sort(pieces.begin(), pieces.end(), [](auto& a, auto& b) { return a.material < b.material; });
     std::vector<Corner> sorted;
@@ -703,14 +661,15 @@ std::vector<Model::Group> group_by_material(Obj& obj, const Library& library, st
 // Adds what a group of faces needs: from the .mtl, and where that names none, the pictures beside the model or beside
 // what it is a link to.
 void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, const MtlMaterial& mtl,
-                   Material& material, NormalMap wanted, Model::Textures& textures, Notes& notes) {
-    for (const Model::Note& note : mtl.notes) add(notes, note);
+                   Material& material, NormalMap wanted, Model::Textures& textures, Model::Notes& notes) {
+    for (const auto& [what, note] : mtl.notes) add(notes, what, note.first, note.count);
     MtlMap maps[map_count];
+    std::error_code ignored;
     for (int i = 0; i < map_count; i++) {
         const bool is_bump = i == tangent_map && mtl.maps[i].path.empty();
         maps[i] = mtl.maps[is_bump ? bump_map : i];
         for (fs::path file : {path, fs::weakly_canonical(path)})
-            if (maps[i].path.empty() && is_there(file.replace_extension() += map_suffixes[i])) {
+            if (maps[i].path.empty() && fs::exists(file.replace_extension() += map_suffixes[i], ignored)) {
                 maps[i].path = picture(file, file.filename().string(), notes);
                 break;
             }
@@ -721,7 +680,7 @@ void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, co
                                      [](const Corner& c) { return c.uv >= 0; });
     for (int i = 0; i < map_count; i++) {
         if (maps[i].path.empty()) continue;
-        if (!has_uvs) return add(notes, {"no texture coordinates, so no textures", in_quotes(material.name)});
+        if (!has_uvs) return add(notes, "no texture coordinates, so no textures", in_quotes(material.name));
         textures[maps[i].path].push_back({group.material, map_members[i]});
         material.*map_members[i] = maps[i].map;
     }
@@ -735,9 +694,9 @@ Model::Model(const fs::path& path, NormalMap wanted) {
     Obj obj(path, read_text(path));
     notes_ = std::move(obj.notes);
     PolygonCutter cutter;
-    for (const Obj::Polygon& p : obj.polygons)
-        if (!cutter.cut(obj.verts, obj.corners_of(p.face), p.corners))
-            add(notes_, {"a polygon that crosses itself or has very many corners", "of " + std::to_string(p.corners)});
+    for (const auto& [face, n] : obj.polygons)
+        if (!cutter.cut(obj.verts, obj.corners_of(face), n))
+            add(notes_, "a polygon that crosses itself or has very many corners", "of " + std::to_string(n));
     given_normals_ = count(obj.normals);
     if (obj.lacks_normals) make_normals(obj);
 
@@ -771,15 +730,16 @@ void Model::load_textures() {
         started.pop_front();
         for (const auto& [material, map] : uses)
             if ((map == &Material::normal || map == &Material::tangent) && picture->is_grey())
-                add(notes_, {"a grey picture, heights and no normals, left out", fs::path(path).filename().string()});
+                add(notes_, "a grey picture, heights and no normals, left out", fs::path(path).filename().string());
             else (materials_[material].*map).picture = picture;
     }
 }
 
 std::vector<std::string> Model::notes() const {
     std::vector<std::string> lines;
-    for (const auto& [what, first, count] : notes_)
-        lines.push_back(what + ": " + first + (count > 1 ? " and " + std::to_string(count - 1) + " more" : ""));
+    for (const auto& [what, note] : notes_)
+        lines.push_back(what + ": " + note.first +
+                        (note.count > 1 ? " and " + std::to_string(note.count - 1) + " more" : ""));
     return lines;
 }
 

@@ -46,10 +46,11 @@ public:
     struct Group {  // the faces [begin,end) share a material
         int begin, end, material;
     };
-    struct Note {  // of a kind of thing: the first one, and how many there are
-        std::string what, first;
-        int count = 1;
+    struct Note {  // of one kind of thing: the first one, and how many there are
+        std::string first;
+        int count = 0;
     };
+    using Notes = std::map<std::string, Note>;
     // By path, and of each of the materials that use it: its index, and which map the picture is.
     using Textures = std::map<std::string, std::vector<std::pair<int, Map Material::*>>>;
 
@@ -121,5 +122,5 @@ private:
     std::vector<Material> materials_;
     std::vector<Group> groups_;
     Textures textures_;
-    std::vector<Note> notes_;
+    Notes notes_;
 };

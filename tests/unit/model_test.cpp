@@ -185,11 +185,11 @@ TEST("line ends, tabs, blanks, comments, continued lines, a byte order mark, wor
         {"v 0 0 0\r\n\r\nf 1 1 2\r\n", "3:"},
         {"v 0 0 \\\n 0\nv 1 0 0\nv x 1 1\n", "4: 'x' is no finite number"},
         {"v 0 0 \\\n 0\nv 1 \\\n y 0\n", "4: 'y' is no finite number"},
-        {"o a \\\n b \\\n c\nf 1 2 0\n", "4: vertex index 0"},
+        {"o a \\\n b \\\n c\nf 1 2 0\n", "4: '0' is none"},
         {"v 0 0 0\rv 1 0\rf 1 1 1\r", "2: a vertex needs three coordinates"},
         {square + "f 1 \\2 3\n", "5:"},
         {"\xEF\xBB\xBF\n\nf 0 1 1", "3:"},
-        {square + "f 1 2" + blanks + "0\n", "5: vertex index 0"},
+        {square + "f 1 2" + blanks + "0\n", "5: '0' is none"},
         {continued + "x", "400005: 'x' is no vertex index"},
     });
     const Model fans = load(many + "\nf 2 3 4");
@@ -263,7 +263,7 @@ TEST("what is no finite number or no index, is missing or out of range is an err
         check_errors({{"\nv 0 " + bad + " 0\n", "2: '" + bad + "' is no finite number"}});
     for (const std::string bad : {"1x", "1/1x", "1//1x", "1/1/1/1", "1.0", "1/1/1x", "1e0"})
         check_errors({{full_square + "f 1 2 " + bad + "\n", "11: garbage after a number: '"}});
-    for (const std::string bad : {"x", "/1", "//1", "-", "+", "--1", "nan", "2147483648", "4294967297", "-2147483648",
+    for (const std::string bad : {"x", "/1", "//1", "-", "+", "--1", "nan", "2147483648", "4294967297", "-2147483649",
                                   "99999999999999999999999999", "18446744073709551617"})
         check_errors({{full_square + "f 1 2 " + bad + "\n", "11: '" + bad + "' is no vertex index"}});
     for (const std::string few : {"v", "v 1 2", "v 1 2 #3"})
@@ -275,11 +275,11 @@ TEST("what is no finite number or no index, is missing or out of range is an err
         {full_square + "f 1 2/x 3\n", "11: 'x' is no texture index"},
         {full_square + "f 1 2/- 3\n", "11: '-' is no texture index"},
         {full_square + "f 1 2//x 3\n", "11: 'x' is no normal index"},
-        {square + "f 1 2 0\n", "5: vertex index 0: 4 are defined, counted from 1"},
-        {square + "f 1 2 5\n\nf 1 2 3\n", "5: vertex index 5: 4 are defined, counted from 1"},
-        {"f 1 2 3\n\nf 1/1 2 5/7\nf 9 9 9\n" + square, "3: vertex index 5: 4 are defined, counted from 1"},
-        {square + "f 1 2 -5//2\nv 0 0 0\n", "5: vertex index -5: 4 are defined, counted from 1"},
-        {square + "f 1 2 2147483647\n", "5: vertex index 2147483647: 4 are defined, counted from 1"},
+        {square + "f 1 2 0\n", "5: '0' is none of the 4 vertices, counted from 1"},
+        {square + "f 1 2 5\n\nf 1 2 3\n", "5: '5' is none of the 4 vertices, counted from 1"},
+        {"f 1 2 3\n\nf 1/1 2 5/7\nf 9 9 9\n" + square, "3: '5/7' is none of the 4 vertices, counted from 1"},
+        {square + "f 1 2 -5//2\nv 0 0 0\n", "5: '-5//2' is none of the 4 vertices, counted from 1"},
+        {square + "f 1 2 2147483647\n", "5: '2147483647' is none of the 4 vertices, counted from 1"},
     });
 }
 
@@ -541,6 +541,9 @@ TEST("without normals edges of up to 60 degrees are smooth; groups say it themse
     const Model touching = load(roofs + "f 1 2 3\nf 1 4 5\n");
     CHECK(!is_smooth(touching, 0) && !is_smooth(touching, 1));
     CHECK(is_smooth(load(roofs + "f 1 2 3\nf 1 3 4\n")));
+    // The two sides of a sheet are smooth each for itself.
+    const Model sheet = load(roofs + "f 1 2 3\nf 3 2 1\nf 1 3 4\nf 4 3 1\n");
+    CHECK(is_smooth(sheet, 0) && is_smooth(sheet, 2) && dot(sheet.normal(0, 0), sheet.normal(1, 2)) < -.99);
     // A face without area between two others separates nothing.
     CHECK_EQ(normals(load(roofs + "f 1 2 3\nf 1 3 3\nf 1 3 4\n")), normals(load(roofs + "f 1 2 3\nf 1 3 4\n")));
 }
@@ -686,8 +689,8 @@ TEST("faces without texture coordinates have no textures; grey pictures are no n
     for (const char* name : suffixes) folder.picture(name, 77, TGAImage::GRAYSCALE);
     const Model m = folder.load(full_square + "usemtl a\nf 1 2 3/1\nusemtl b\nf 1 2 3\n",
                                 "newmtl a\nnewmtl b\nmap_Kd m_diffuse.tga\n");
-    CHECK_EQ(maps(m), "77 -1 -1 77 77; -1 -1 -1 -1 -1; no texture coordinates, so no textures: 'b'\n"
-                      "a grey picture, heights and no normals, left out: m_nm.tga\n");
+    CHECK_EQ(maps(m), "77 -1 -1 77 77; -1 -1 -1 -1 -1; a grey picture, heights and no normals, left out: m_nm.tga\n"
+                      "no texture coordinates, so no textures: 'b'\n");
     CHECK_EQ(m.materials()[0].diffuse->bytespp(), 1);
     // Heights are often stored in three channels.
     TGAImage heights(2, 2, TGAImage::RGB);
@@ -798,7 +801,7 @@ TEST("a corrupt picture is an error, in a fixed order; what no face uses is not 
 
     // The errors of the .obj, then of the textures by their names.
     for (const char* name : suffixes) folder.write(name, "no picture");
-    CHECK_THROWS(folder.load(textured + "f 0 0 0\n", "Kd x\n"), "m.obj:13: vertex index 0");
+    CHECK_THROWS(folder.load(textured + "f 0 0 0\n", "Kd x\n"), "m.obj:13: '0' is none");
     for (int i = 0; i < 50; i++) CHECK_THROWS(folder.load(textured, ""), "m_diffuse.tga: ");
     fs::remove(folder / "m_diffuse.tga");
     for (int i = 0; i < 50; i++) CHECK_THROWS(folder.load(textured, ""), "m_glow.tga: ");
