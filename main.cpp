@@ -478,7 +478,10 @@ static void run(Options opt) {
     const double start = milliseconds();
     prepare_folder(opt);
     Scene scene = load(opt);
-    if (opt.fit && fit(scene.models)) {
+    // As the default eye sees it, so that a scene does not change its size when the eye moves; but whoever says what is
+    // up has another view in mind.
+    const bool has_up = !(opt.up == Options().up);
+    if (opt.fit && fit(scene.models, has_up ? opt.eye - opt.center : Options().eye, opt.up)) {
         if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the lesson's leaves dark what faces the viewer
         if (!opt.quiet) complain(opt.own_light ? "the scene is fitted to the picture (--no-fit)" :
                                  "the scene is fitted to the picture and lit from 1,1,1 (--no-fit, --light X,Y,Z)", 0);

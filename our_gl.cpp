@@ -41,8 +41,8 @@ mat4 middle_viewport(int width, int height, double zoom) {
     return viewport((width - side) / 2, (height - side) / 2, side, side);
 }
 
-bool fit(std::vector<Model>& scene, const vec3& eye) {
-    const mat4 ModelView = lookat(eye, {}, {0, 1, 0});
+bool fit(std::vector<Model>& scene, const vec3& eye, const vec3& up) {
+    const mat4 ModelView = lookat(eye, {}, up);
     const double distance = norm(eye), reach = 4. / 3;  // where a picture ends whose middle three quarters are [-1,1]^2
     const auto largest = [](const vec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); };
     // Times s = 1/need a vertex is seen on the border of [-1,1]^2: there s max(|x|,|y|) = w = 1 - s z/|eye|.

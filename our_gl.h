@@ -58,10 +58,10 @@ struct Models : std::vector<const Model*> {
 };
 
 // Makes a scene fill the picture, all models by one transform: the centre of their box comes to the origin, and they
-// are as large as the middle three quarters hold every vertex, seen from eye. A scene is left alone, and the result
-// false, where from there every vertex falls into a square picture, the box's largest half side is at least 1/2 and its
-// centre is within 1/2 of the origin.
-bool fit(std::vector<Model>& scene, const vec3& eye = {1, 1, 4});
+// are as large as the middle three quarters hold every vertex, seen from eye towards the origin. A scene is left alone,
+// and the result false, where from there every vertex falls into a square picture, the box's largest half side is at
+// least 1/2 and its centre is within 1/2 of the origin.
+bool fit(std::vector<Model>& scene, const vec3& eye = {1, 1, 4}, const vec3& up = {0, 1, 0});
 
 // An orthographic camera, fitted: its projection and viewport are replaced so that the models fill all of size x size
 // pixels and of [0, screen_depth].

@@ -15,9 +15,9 @@
 
 namespace {
 
-constexpr std::array<std::string_view, 8> names = {
+constexpr std::array<std::string_view, 9> names = {
     "model.obj",           "model.mtl",      "model_diffuse.tga", "model_nm.tga",
-    "model_nm_tangent.tga", "model_spec.tga", "model_glow.tga",    "a.tga"};
+    "model_nm_tangent.tga", "model_spec.tga", "model_glow.tga",    "a.tga", "B.png"};
 
 // Writes the input's files; those that it does not hold do not exist.
 class Files {
@@ -84,11 +84,18 @@ void check(const Model& model) {
     REQUIRE(end == model.nfaces());
     REQUIRE(std::all_of(used.begin(), used.end(), [](char u) { return u == 1; }));
     for (const Material& m : model.materials()) {
-        for (int i = 0; i < 3; i++) REQUIRE(m.Kd[i] >= 0 && m.Kd[i] <= 1);
+        for (int i = 0; i < 3; i++) REQUIRE(m.Kd[i] >= 0 && m.Kd[i] <= 1 && m.Ke[i] >= 0 && m.Ke[i] <= 1);
         REQUIRE(!m.normal || !m.tangent);
-        for (const Map& map : {m.normal, m.tangent}) REQUIRE(!map || map->bytespp() >= 3);
+        for (const Map& map : {m.normal, m.tangent}) REQUIRE(!map || !map->is_grey());
+        for (const Map* map : {&m.diffuse, &m.normal, &m.tangent, &m.specular, &m.glow}) {
+            const vec2 a = map->scale, b = map->offset;
+            REQUIRE(is_finite({a.x, a.y, 0}) && is_finite({b.x, b.y, 0}));
+            REQUIRE(map->is_moved || (a == vec2{1, 1} && b == vec2{}));
+        }
     }
-    REQUIRE(model.notes().size() <= 21);
+    for (int i = 0; i < 3 * model.nfaces() && model.has_colors(); i++)
+        for (int k = 0; k < 3; k++) REQUIRE(model.color(i / 3, i % 3)[k] >= 0 && model.color(i / 3, i % 3)[k] <= 1);
+    REQUIRE(model.notes().size() <= 11);  // kinds
     for (const std::string& note : model.notes()) REQUIRE(is_one_line(note));
 }
 

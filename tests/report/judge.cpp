@@ -45,7 +45,10 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     for (const std::string& path : paths) models.emplace_back(path);
     const std::vector<Model> as_loaded = models;
-    if (fits && fit(models) && values["--light"].empty()) light = {1, 1, 1};
+    const View usual;
+    const bool has_up = !(view.up == usual.up);
+    if (fits && fit(models, has_up ? view.eye - view.center : usual.eye, view.up) && values["--light"].empty())
+        light = {1, 1, 1};
     for (std::size_t i = 0; i < models.size(); i++) {
         const std::string name = "copy" + std::to_string(i) + ".obj";
         towards_light.push_back(folder.write(name, copy_of(as_loaded[i], normalized(light))));

@@ -82,6 +82,21 @@ TEST("fit leaves alone what is seen as a whole, near the origin and not small") 
     for (const double reach : {1.333, 1.334}) CHECK_EQ(fits({right * reach, right * -.5, {}}), reach > 4. / 3);
 }
 
+TEST("fit sees a scene whose up is z from where its eye is") {
+    const vec3 eye{1, -4, 1}, up{0, 0, 1};
+    const std::vector<vec3> tall{{-.1, 0, 0}, {.1, 0, 0}, {0, 0, 3}};
+    const mat4 to_clip = projection(-1 / norm(eye)) * lookat(eye, {}, up);
+    const auto most = [&](const std::vector<Model>& scene) {
+        double y = 0;
+        for (const vec3& v : scene[0].verts()) y = std::max(y, std::fabs(project(to_clip * point(v)).y));
+        return y;
+    };
+    std::vector<Model> seen = triangles(tall), lost = triangles(tall);
+    CHECK(fit(seen, eye, up) && fit(lost));
+    CHECK_NEAR(most(seen), 1, 1e-14);
+    CHECK(most(lost) > 1.5);
+}
+
 TEST("fit centres the box of all models, and the farthest vertex is on the middle square's border") {
     Random r(5);
     for (int k = 0; k < 300; k++) {
