@@ -175,6 +175,7 @@ INLINED pack<T> each(const pack<T>& a, F&& f) {
     return pack<T>(values);
 }
 INLINED real sqrt(const real& a) { return each(a, [](float v) { return std::sqrt(v); }); }
+INLINED coord sqrt(const coord& a) { return each(a, [](double v) { return std::sqrt(v); }); }
 INLINED coord floor(const coord& a) { return each(a, [](double v) { return std::floor(v); }); }
 INLINED coord abs(const coord& a) { return each(a, [](double v) { return std::fabs(v); }); }
 
@@ -294,19 +295,20 @@ vec<n, T> normalized(const vec<n, T>& v) {
     const T squared = dot(scaled, scaled);
     return squared > 0 && std::isfinite(squared) ? scaled / std::sqrt(squared) : v;
 }
-template <int n>
-INLINED vec<n, real> normalized(const vec<n, real>& v) {
-    const real squared = dot(v, v);
-    vec<n, real> unit = v / sqrt(squared);
-    if (any(!(squared > 1e-30) | !(squared < 1e30))) {  // rare: each lane by itself
-        float lane[n][lanes];
+template <int n, typename T>
+INLINED vec<n, pack<T>> normalized(const vec<n, pack<T>>& v) {
+    const pack<T> squared = dot(v, v);
+    vec<n, pack<T>> unit = v / sqrt(squared);
+    const mask is_usual = (squared > 1e-30) & (squared < 1e30);
+    if (any(!is_usual)) {  // rare: each lane by itself
+        T lane[n][lanes];
         for (int l = 0; l < lanes; l++) {
-            vec<n, float> one;
+            vec<n, T> one;
             for (int i = 0; i < n; i++) one[i] = v[i][l];
             one = normalized(one);
             for (int i = 0; i < n; i++) lane[i][l] = one[i];
         }
-        for (int i = 0; i < n; i++) unit[i] = real(lane[i]);
+        for (int i = 0; i < n; i++) unit[i] = pack<T>(lane[i]);
     }
     return unit;
 }

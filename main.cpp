@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -20,7 +21,10 @@
 struct Options {  // the lesson's scene; the command line can change each of these
     int width = 800, height = 800;  // of the picture, in pixels
     int shadow_size = 800;          // of the shadow buffer, in pixels a side
-    vec3 light_dir{1, 1, 0};        // towards the light
+    enum class Light { directional, spot, point } light = Light::directional;
+    vec3 light_dir{1, 1, 0};  // from center towards the light; where a spot or point light has its place, all the way
+    double half_angle = 0;    // of a spot light's beam, or of what a point light's shadow buffer sees; in degrees
+    bool square_beam = false;
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     double zoom = 1;  // about the middle of the picture
     enum class Method { map, exact, off } method = Method::map;  // of shadows
@@ -56,6 +60,17 @@ struct Shadow {  // what the first pass leaves for the second
 
 // ---- pass 2: what the viewer sees ----
 
+// A light is a camera. A directional one is infinitely far off, so it has no perspective; the others stand at their
+// place and see as far as reach to each side, in the plane through center.
+static Camera light_camera(const Options& opt) {
+    const double distance = opt.light == Options::Light::directional ? INFINITY : norm(opt.light_dir);
+    return {lookat(opt.light_dir, opt.center, opt.up), projection(-1 / distance)};
+}
+static double reach(const Options& opt) {
+    if (opt.light == Options::Light::directional) return INFINITY;
+    return norm(opt.light_dir) * std::tan(opt.half_angle * std::numbers::pi / 180);
+}
+
 // Phong's reflection model with the lesson's weights, in eye coordinates. What a material has no map for is not
 // computed. fragment() is called for a few neighbouring pixels of a face at once: a coord says where each of them is, a
 // real how bright, a mask yes or no; select() is the ?: of a mask.
@@ -66,20 +81,25 @@ struct PhongShader final : IShader {
     mat4 uniform_PM;           // Projection*ModelView
     mat4 uniform_MIT;          // ModelView.invert_transpose(), carries normals where ModelView carries points
     mat4 uniform_Mshadow;      // from the viewer's screen to the shadow buffer's
-    vec3 uniform_l;            // light vector: towards the light, of length 1
+    mat4 uniform_Mbeam;        // from the viewer's screen to the light's clip space
+    vec3 uniform_light;        // light vector: towards the light, of length 1; or the place of a spot or point light
     int grid_face;             // the number of the model's first face in the grid of exact shadows
     const Material* material;  // the face's: written by varying(), read by fragment(), as what follows
     vec2 varying_uv[3];        // texture coordinates of a triangle
     vec3 varying_nrm[3];       // normals of the vertices
     vec3 varying_color[3];     // colours of the vertices, red first
-    vec3 varying_eye[3];       // the triangle in eye coordinates, for tangent-space normals
-    vec3 varying_sb[3];        // the triangle in the shadow buffer, for the bias and for exact shadows
+    vec3 varying_eye[3];       // the triangle in eye coordinates
+    vec4 varying_sb[3];        // the triangle on the light's screen, homogeneous, for exact shadows
+    vec2 sb_slope;             // of its depth there, for the bias
 
     PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m)
         : IShader(m), opt(o), shadow(s), uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
           uniform_MIT(invert_transpose(uniform_M).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
-          uniform_l(normalized((uniform_M * direction(normalized(opt.light_dir))).xyz())),
+          uniform_Mbeam(light_camera(o).to_clip() * camera.from_screen()),
+          uniform_light(o.light == Options::Light::directional
+                            ? normalized((uniform_M * direction(normalized(o.light_dir))).xyz())
+                            : (uniform_M * point(o.light_dir)).xyz()),
           grid_face(shadow.grid.first_face(m)) {}
 
     vec4 vertex(int vert) const override { return uniform_PM * point(model.vert(vert)); }
@@ -88,11 +108,13 @@ struct PhongShader final : IShader {
         const vec3& v = model.vert(iface, nthvert);
         material = &model.material(iface);
         varying_uv[nthvert] = model.uv(iface, nthvert);
-        if (shadow.method != Options::Method::off) varying_sb[nthvert] = project(shadow.M * point(v));
+        if (shadow.method != Options::Method::off) varying_sb[nthvert] = shadow.M * point(v);
+        if (nthvert == 2) sb_slope = depth_slope(varying_sb);
         if (!material->normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
         if (model.has_colors()) varying_color[nthvert] = model.color(iface, nthvert);
-        if (material->tangent) varying_eye[nthvert] = (uniform_M * point(v)).xyz();
+        if (material->tangent || opt.light != Options::Light::directional)
+            varying_eye[nthvert] = (uniform_M * point(v)).xyz();
     }
 
     Color fragment(const Fragment& f) const override {
@@ -103,8 +125,8 @@ struct PhongShader final : IShader {
             texel = {texel.x * rgb.z, texel.y * rgb.y, texel.z * rgb.x};
         }
         const vec<3, real> n = normal(uv, f);
-        const vec3 l = uniform_l;
-        const real diff = max(0, dot(n, l));
+        const vec<3, real> l = light_vector(f);
+        const real diff = select(in_beam(f), max(0, dot(n, l)), 0);
         const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow, no highlight
         const mask lit = any(facing) ? in_light(f) : false;
         real spec = 0;
@@ -125,15 +147,29 @@ struct PhongShader final : IShader {
         return c;
     }
 
+    vec<3, real> light_vector(const Fragment& f) const {  // towards the light, of length 1
+        if (opt.light == Options::Light::directional) return {uniform_light.x, uniform_light.y, uniform_light.z};
+        return to_real(normalized(uniform_light - interpolated(varying_eye, f.bar)));
+    }
+
+    mask in_beam(const Fragment& f) const {  // of a spot light; the others have none
+        if (opt.light != Options::Light::spot) return true;
+        const vec<4, coord> p = uniform_Mbeam * point(f.screen);
+        const coord edge = p.w * reach(opt);
+        return (p.w > 0) & (opt.square_beam ? max(abs(p.x), abs(p.y)) < edge : p.x * p.x + p.y * p.y < edge * edge);
+    }
+
     mask in_light(const Fragment& f) const {
         if (shadow.method == Options::Method::off) return true;
+        const vec<4, coord> sb_h = uniform_Mshadow * point(f.screen);
+        const mask is_behind = !(sb_h.w > 0);  // a point light: what its buffer does not see is lit
         if (shadow.method == Options::Method::exact)
-            return !shadow.grid.shadows(interpolated(varying_sb, f.bar), grid_face + f.face);
-        const vec<3, coord> sb_p = project(uniform_Mshadow * point(f.screen));  // the point in the shadow buffer
+            return is_behind | !shadow.grid.shadows(project(interpolated(varying_sb, f.bar)), grid_face + f.face);
+        const vec<3, coord> sb_p = project(sb_h);  // the point in the shadow buffer
         const coord stored = shadow.shadowbuffer.at(sb_p);
         // With --bias 0 surfaces shadow themselves here and there: z-fighting. The text's cure is --bias 43.34.
-        const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, varying_sb);
-        return !(stored > sb_p.z + bias);  // so written because nothing but a number shadows
+        const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, sb_slope);
+        return is_behind | !(stored > sb_p.z + bias);  // so written because nothing but a number shadows
     }
 
     vec<3, real> normal(const UV& uv, const Fragment& f) const {  // of length 1
@@ -169,10 +205,12 @@ static Camera viewer(const Options& opt) {
 static void first_pass(const Options& opt, const Models& casters, Shadow& shadow) {
     if (casters.empty()) return;
     shadow.method = opt.method;
-    const bool exact = opt.method == Options::Method::exact, classic = opt.bias.has_value();
+    const bool exact = opt.method == Options::Method::exact;
+    const bool classic = opt.bias && opt.light == Options::Light::directional;
     const int size = exact ? LightGrid::good_cells(casters) : opt.shadow_size;
-    Camera light{lookat(opt.light_dir, opt.center, opt.up), projection(0), middle_viewport(size, size)};
-    if (!classic) light = fitted(light, casters, size);
+    Camera light = light_camera(opt);
+    light.Viewport = middle_viewport(size, size);
+    if (!classic) light = fitted(light, casters, size, reach(opt));
     shadow.M = light.to_screen();
     shadow.aspect = light.Projection[1][1] / light.Projection[0][0];
     if (exact) {
@@ -242,9 +280,22 @@ struct Value {
             fail("three numbers X,Y,Z joined by commas, as in 1,1,0");
         if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
     }
+    void read_light(Options& o, Options::Light kind, double half_angle) const {
+        char rest;
+        vec3& v = o.light_dir;
+        const int n = std::sscanf(text.c_str(), "%lf,%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &half_angle, &rest);
+        if (kind == Options::Light::directional || n == 3) Value{option, text}.read(v);
+        else if (n != 4 || !(half_angle > 0 && half_angle <= 89)) fail("X,Y,Z or X,Y,Z,DEG, DEG up to 89");
+        else if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
+        o.light = kind, o.half_angle = half_angle, o.own_light = true;
+    }
     int one_of(const std::vector<std::string>& names) const {  // which
         const auto found = std::find(names.begin(), names.end(), text);
-        if (found == names.end()) fail(names[0] + ", " + names[1] + " or " + names[2]);
+        if (found == names.end()) {
+            std::string list = names[0];
+            for (std::size_t i = 1; i < names.size(); i++) list += (i + 1 < names.size() ? ", " : " or ") + names[i];
+            fail(list);
+        }
         return static_cast<int>(found - names.begin());
     }
 };
@@ -269,7 +320,13 @@ static const Option options[] = {
     {"--zoom", "F", "magnifies about the middle, which a nearer eye does not (1)",
      [](Options& o, const Value& v) { v.read_zoom(o.zoom); }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
-     [](Options& o, const Value& v) { v.read(o.light_dir), o.own_light = true; }},
+     [](Options& o, const Value& v) { v.read_light(o, Options::Light::directional, 0); }},
+    {"--spot", "X,Y,Z[,DEG]", "a spot light's place and the half angle of its beam, which goes to the center (25)",
+     [](Options& o, const Value& v) { v.read_light(o, Options::Light::spot, 25); }},
+    {"--point", "X,Y,Z[,DEG]", "a point light's place, and how far around it has shadows, from the center on (80)",
+     [](Options& o, const Value& v) { v.read_light(o, Options::Light::point, 80); }},
+    {"--beam", "SHAPE", "a spot light's: round or square (round)",
+     [](Options& o, const Value& v) { o.square_beam = v.one_of({"round", "square"}) == 1; }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
      [](Options& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
@@ -319,7 +376,10 @@ static Options parse(int argc, char** argv) {
     }
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
     if (opt.bias && opt.method != Options::Method::map) throw UsageError("--bias belongs to --shadow map");
-    if (opt.light_dir == vec3{}) throw UsageError("--light has no direction");
+    const bool is_far = opt.light == Options::Light::directional;
+    if (is_far && opt.light_dir == vec3{}) throw UsageError("--light has no direction");
+    if (!is_far && !std::isfinite(1 / norm(opt.light_dir - opt.center)))
+        throw UsageError("the light and --center are at the same point");
     if (opt.only == Options::Only::depth && opt.method != Options::Method::map)
         throw UsageError("--only depth: there is no shadow buffer without --shadow map");
     if (opt.models.empty()) opt.models.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
@@ -332,7 +392,7 @@ static void print_help() {
               "depth.tga. Several models share one scene; - is one on standard input. Without a model: the idol.\n");
     for (const Option& o : options) {
         const std::string names = std::string(o.short_name) + (*o.short_name ? ", " : "") + o.name;
-        std::printf("  %-18s %s\n", (names + ' ' + o.takes).c_str(), o.help);
+        std::printf("  %-20s %s\n", (names + ' ' + o.takes).c_str(), o.help);
     }
 }
 
@@ -363,8 +423,14 @@ static Scene load(const Options& opt) {
 // What the scene does not need is left out from here on.
 static void leave_out(const Options& opt, Scene& scene) {
     scene.seen = seen_by(viewer(opt), scene.models, opt.width, opt.height);
-    if (opt.method != Options::Method::off)
+    if (opt.method != Options::Method::off && opt.light == Options::Light::directional)
         scene.casters = casters(scene.models, scene.seen, lookat(opt.light_dir, opt.center, opt.up));
+    if (opt.method != Options::Method::off && opt.light != Options::Light::directional) {
+        Camera light = light_camera(opt);
+        const double side = 1 / reach(opt);  // so the beam comes to [0,1]^2
+        light.Viewport = viewport(.5 - side / 2, .5 - side / 2, side, side);
+        scene.casters = scene.seen.empty() ? Models() : seen_by(light, scene.models, 1, 1);
+    }
     if (opt.only == Options::Only::depth) scene.seen.clear();
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         Model& model = scene.models[i];
@@ -488,6 +554,7 @@ static void run(Options opt) {
     }
     for (Model& model : scene.models) model.move([&](const vec3& v) { return v - opt.center; });
     // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
+    if (opt.light != Options::Light::directional) opt.light_dir = opt.light_dir - opt.center;
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
     leave_out(opt, scene);
     const double loaded = milliseconds();

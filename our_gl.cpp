@@ -76,16 +76,35 @@ bool fit(std::vector<Model>& scene, const vec3& eye, const vec3& up) {
     return true;
 }
 
-Camera fitted(const Camera& camera, const Models& models, int size) {
+// The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the
+// rounding of a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then
+// moves by 2^15 * 2^-50 / w_near. With w_near = 2^-22 that is 2^-13 pixel, which no picture shows, and things stay
+// visible down to a quarter of a millionth of the viewing distance.
+static constexpr double w_near = 1. / (1 << 22);
+
+Camera fitted(const Camera& camera, const Models& models, int size, double reach) {
     constexpr double inf = std::numeric_limits<double>::infinity();
-    Camera result{camera.ModelView, mat4::identity(), viewport(0, 0, size, size)};
+    const mat4 to_clip = camera.to_clip();
+    const double c = camera.Projection[3].z;  // 0: orthographic
+    const auto for_each_vertex = [&](auto&& visit) {
+        for (const Model* model : models)
+            for (const vec3& v : model->verts()) visit(to_clip * point(v));
+    };
+    // What is nearer to a light with a place than a thousandth of the way to what is farthest has larger depths than
+    // screen_depth: else all others would share what is left of it.
+    double nearest = w_near;
+    if (c != 0) for_each_vertex([&](const vec4& p) { nearest = std::max(nearest, p.w / 1024); });
     vec3 low{inf, inf, inf}, high{-inf, -inf, -inf};
-    for (const Model* model : models) {
-        for (const vec3& v : model->verts()) {
-            const vec3 p = (camera.ModelView * point(v)).xyz();
-            for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+    for_each_vertex([&](const vec4& p) {
+        const bool is_before = p.w >= nearest;
+        const vec3 q = c == 0 ? p.xyz() : is_before ? project(p) : vec3{reach, reach, (nearest - 1) / c / nearest};
+        for (int i = 0; i < 3; i++) {
+            low[i] = std::min(low[i], is_before || i == 2 ? q[i] : -q[i]);
+            high[i] = std::max(high[i], q[i]);
         }
-    }
+    });
+    for (int i = 0; i < 2; i++) low[i] = std::max(low[i], -reach), high[i] = std::min(high[i], reach);
+    mat4 to_cube = mat4::identity();
     double largest = 0;
     for (int i = 0; i < 3; i++) largest = std::max({largest, std::fabs(low[i]), std::fabs(high[i])});
     for (int i = 0; i < 3; i++) {  // the box [low,high] to [-1,1]^3
@@ -94,10 +113,10 @@ Camera fitted(const Camera& camera, const Models& models, int size) {
         // of the largest coordinate, and screen_depth/2 * 2^-50 / 2^-24 is below a quarter of depth_rounding.
         if (i == 2) half = std::max(half, largest * 0x1p-24);
         if (!(half >= 0x1p-1000)) half = 1;  // no extent, or one whose inverse is no double: any scale will do
-        result.Projection[i][i] = 1 / half;
-        result.Projection[i][3] = -(low[i] + half) / half;
+        to_cube[i][i] = 1 / half;
+        to_cube[i][3] = -(low[i] + half) / half;
     }
-    return result;
+    return {camera.ModelView, to_cube * camera.Projection, viewport(0, 0, size, size)};
 }
 
 namespace {
@@ -311,12 +330,6 @@ constexpr int subpixel_bits = 16;
 // Of a triangle cut by five planes. A plane adds one corner to what is convex; where rounding bends a face seen edge-on
 // it may add one for every two: 3, 4, 6, 9, 13, 19.
 constexpr int most_corners = 19;
-
-// The near plane, as a share of the distance from eye to centre. w = 1 + c z is near zero there and carries the
-// rounding of a number near one, some 2^-50 after the matrix products; a corner on the guard band at 2^15 pixels then
-// moves by 2^15 * 2^-50 / w_near. With w_near = 2^-22 that is 2^-13 pixel, which no picture shows, and things stay
-// visible down to a quarter of a millionth of the viewing distance.
-constexpr double w_near = 1. / (1 << 22);
 
 // How far outside of the picture, in pixels, coverage is still computed exactly instead of being clipped: most faces
 // that cross the border need no clipping. 2 * 4096 + 16384 pixels at 16 sub-pixel bits make differences below 2^30.6.
@@ -846,15 +859,12 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImag
 //   Along each axis the neighbour nearer in depth tells by how much (the other may be another surface); if both are
 //   lower, half. What is one texel thin, with nothing on either side, may fall without end: it throws no shadow.
 //
-// And rounding: depths are floats, which below 2048 are off by half a unit in the last place at most; coverage is
-// snapped by half a sub-pixel.
-coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored,
-                   const vec3 (&face)[3]) {
-    constexpr double depth_rounding = 1. / (1 << 14);
-    const vec3 n = cross(face[1] - face[0], face[2] - face[0]);
-    const vec2 slope{-n.x / n.z, -n.y / n.z};  // of the face's depth, per texel along x and y
+// And rounding: depths are floats, which are off by half a unit in the last place, 2^-25 of them, at most (below 2048,
+// where nearly all are, by that of 2048); coverage is snapped by half a sub-pixel.
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored, const vec2& slope) {
     const vec<2, coord> to_centre{floor(sb_p.x) + .5 - sb_p.x, floor(sb_p.y) + .5 - sb_p.y};
-    const double rounding = depth_rounding + (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
+    const double snapping = (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
+    const coord rounding = max(2048, stored) * 0x1p-25 + snapping;
     const coord receiver = dot(slope, to_centre);
     if (!any(stored > sb_p.z + (receiver + rounding))) return receiver + rounding;
 
@@ -868,6 +878,11 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
     return max(receiver, caster) + rounding;
 }
 
+vec2 depth_slope(const vec4 (&corner)[3]) {
+    const vec3 a = project(corner[0]), n = cross(project(corner[1]) - a, project(corner[2]) - a);
+    return {-n.x / n.z, -n.y / n.z};
+}
+
 int LightGrid::good_cells(const Models& models) {
     int faces = 0;
     for (const Model* model : models) faces += model->nfaces();
@@ -879,7 +894,8 @@ static double area2(const vec3& a, const vec3& b, const vec3& c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cells_(cells), models_(models) {
+LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
+    : cells_(cells), side_(cells), models_(models) {
     const mat4 to_screen = light.to_screen();
     std::vector<int> first_vert{0}, first_face{0};
     for (const Model* model : models) {
@@ -887,20 +903,46 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cel
         first_face.push_back(first_face.back() + model->nfaces());
     }
     verts_.resize(first_vert.back()), faces_.resize(first_face.back());
+    if (light.Projection[3].z != 0) ws_.resize(verts_.size());
     in_parts(first_vert, [&](int, int m, int begin, int end, int) {
-        for (int i = begin; i < end; i++) verts_[first_vert[m] + i] = project(to_screen * point(models[m]->vert(i)));
+        for (int i = begin; i < end; i++) {
+            const vec4 p = to_screen * point(models[m]->vert(i));
+            verts_[first_vert[m] + i] = p.xyz();
+            if (!ws_.empty()) ws_[first_vert[m] + i] = p.w;
+        }
     });
     in_parts(first_face, [&](int, int m, int begin, int end, int) {
         for (int i = begin; i < end; i++)
             for (int k = 0; k < 3; k++) faces_[first_face[m] + i][k] = first_vert[m] + models[m]->corner(i, k).vert;
     });
-    for (const vec3& v : verts_) zmax_ = std::max(zmax_, std::fabs(v.z));
+    const auto on_screen = [&](int v) { return ws_.empty() ? verts_[v] : verts_[v] / ws_[v]; };
+    for (int v = 0; v < first_vert.back(); v++) {
+        const double z = std::fabs(on_screen(v).z);
+        if (z <= 2 * screen_depth) zmax_ = std::max(zmax_, z);
+    }
 
-    // The cells of each face's box, and the float above its largest z.
+    // The cells of each face's box, and the float above its largest z. A face that has a corner behind the light has a
+    // box of what is before it, and no largest z.
     struct Extent {
         std::int16_t x0, x1, y0, y1;
         float zmax;
+        bool is_cut;
         int cells() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
+    };
+    const auto bound_of_cut = [&](const std::array<int, 3>& face, vec3& low, vec3& high, vec3& other) {
+        vec4 corners[3], cut[4];
+        for (int k = 0; k < 3; k++) {
+            const vec3& v = verts_[face[k]];
+            corners[k] = {v.x, v.y, v.z, ws_[face[k]]};
+        }
+        const int n = clip_polygon({3, 1, w_near}, corners, 3, cut);
+        low = {INFINITY, INFINITY, INFINITY}, high = -low;
+        for (int k = 0; k < n; k++)
+            for (int i = 0; i < 3; i++) {
+                low[i] = std::min(low[i], cut[k][i] / cut[k].w);
+                high[i] = std::max(high[i], cut[k][i] / cut[k].w);
+            }
+        other = high;
     };
     std::vector<Extent> extents(faces_.size());
     const auto cell_of = [&](double v) {  // NaN: 0
@@ -915,17 +957,21 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cel
         in_parts(first_face, [&](int, int m, int begin, int end, int) {
             std::int64_t own = 0;
             for (int i = first_face[m] + begin; i < first_face[m] + end; i++) {
-                const vec3 &a = verts_[faces_[i][0]], &b = verts_[faces_[i][1]], &c = verts_[faces_[i][2]];
+                bool is_cut = false;
+                vec3 a, b, c;  // the corners, or a box
+                for (const int v : faces_[i]) is_cut = is_cut || (!ws_.empty() && !(ws_[v] >= w_near));
+                if (!is_cut) a = on_screen(faces_[i][0]), b = on_screen(faces_[i][1]), c = on_screen(faces_[i][2]);
+                else bound_of_cut(faces_[i], a, b, c);
                 const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
                 const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
                 const float zmax = std::nextafter(static_cast<float>(std::max({a.z, b.z, c.z})), INFINITY);
-                extents[i] = {cell_of(x0), cell_of(x1), cell_of(y0), cell_of(y1), zmax};
+                extents[i] = {cell_of(x0), cell_of(x1), cell_of(y0), cell_of(y1), zmax, is_cut};
                 own += extents[i].cells();
             }
             sum += own;
         });
         if (cells_ == 1 || sum <= most_entries * first_face.back()) break;
-        cells_ = (cells_ + 1) / 2, scale_ /= 2;
+        cells_ = (cells_ + 1) / 2, scale_ /= 2, side_ /= 2;
         for (vec3& v : verts_) v.x /= 2, v.y /= 2;
     }
 
@@ -933,14 +979,14 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cel
     // its three edges, at least in part; asking costs more than it saves for a small one.
     const auto for_each_cell = [&](int face, int y_begin, int y_end, auto&& visit) {
         const Extent& box = extents[face];
-        const bool is_small = box.cells() <= 9;
-        const vec3* const p[] = {&verts_[faces_[face][0]], &verts_[faces_[face][1]], &verts_[faces_[face][2]]};
-        const double side = is_small ? 1 : area2(*p[0], *p[1], *p[2]);
+        const bool is_small = box.cells() <= 9 || box.is_cut;
+        const vec3 p[] = {on_screen(faces_[face][0]), on_screen(faces_[face][1]), on_screen(faces_[face][2])};
+        const double side = is_small ? 1 : area2(p[0], p[1], p[2]);
         for (int y = std::max<int>(y_begin, box.y0); y < std::min(y_end, box.y1 + 1); y++) {
             for (int x = box.x0; x <= box.x1; x++) {
                 bool outside = false;
                 for (int i = 0; i < 3 && !outside && !is_small; i++) {
-                    const vec3 &a = *p[i], &b = *p[(i + 1) % 3];
+                    const vec3 &a = p[i], &b = p[(i + 1) % 3];
                     // The cell's corner farthest inwards. Rounding of the products is below 2^-50 of their size.
                     const double nx = side < 0 ? b.y - a.y : a.y - b.y, ny = side < 0 ? a.x - b.x : b.x - a.x;
                     const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
@@ -959,8 +1005,8 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells) : cel
     in_parts(first_face, [&](int part, int m, int begin, int end, int) {
         for (int face = first_face[m] + begin; face < first_face[m] + end; face++) {
             const auto [i, j, k] = faces_[face];
-            if (!(std::fabs(area2(verts_[i], verts_[j], verts_[k])) > 0)) continue;
             const Extent& box = extents[face];
+            if (!box.is_cut && !(std::fabs(area2(on_screen(i), on_screen(j), on_screen(k))) > 0)) continue;
             for (int b = box.y0 / band_rows_; b <= box.y1 / band_rows_; b++) touching[part][b].push_back(face);
         }
     });
@@ -1000,7 +1046,7 @@ int LightGrid::first_face(const Model& model) const {
 }
 
 std::size_t LightGrid::bytes() const {
-    std::size_t sum = verts_.size() * sizeof(vec3) + faces_.size() * sizeof(faces_[0]);
+    std::size_t sum = verts_.size() * sizeof(vec3) + ws_.size() * sizeof(double) + faces_.size() * sizeof(faces_[0]);
     for (const auto& [first, entries] : bands_) sum += first.size() * sizeof(first[0]) + entries.size() * sizeof(Entry);
     return sum;
 }
@@ -1008,7 +1054,7 @@ std::size_t LightGrid::bytes() const {
 mask LightGrid::shadows(const vec<3, coord>& on_screen, int number) const {
     const vec<3, coord> p{on_screen.x * scale_, on_screen.y * scale_, on_screen.z};
     // Beside all casters there is light.
-    const mask inside = (!(p.x < 0)) & (!(p.y < 0)) & (p.x < cells_) & (p.y < cells_);
+    const mask inside = (!(p.x < 0)) & (!(p.y < 0)) & (p.x < side_) & (p.y < side_);
     const pack<std::int32_t> x = to_int(select(inside, p.x, 0)), y = to_int(select(inside, p.y, 0));
     const pack<std::int32_t> cell = select(inside, y * cells_ + x, -1);
     mask dark = false, left = inside;
@@ -1030,22 +1076,31 @@ mask LightGrid::shadows(const vec<3, coord>& on_screen, int number) const {
 
 // Is p under the face, seen from the light? With a, b, c the corners relative to p, the areas b x c, c x a, a x b are
 // the barycentric coordinates of p; a shared edge gives its two faces exactly opposite values, so no light falls
-// through.
+// through. Under a light with a place the corners are homogeneous: relative to p is what is left of them after as much
+// of p as their w says. The way through p meets the face before the light if w there is beyond that of the near plane.
 mask LightGrid::covers(int face, const vec<3, coord>& p) const {
     const auto [i, j, k] = faces_[face];
-    const vec<3, coord> a = verts_[i] - p, b = verts_[j] - p, c = verts_[k] - p;
+    const bool is_far = ws_.empty();
+    const vec3 ws = is_far ? vec3{1, 1, 1} : vec3{ws_[i], ws_[j], ws_[k]};
+    const auto relative = [&](int v, double w) { return is_far ? verts_[v] - p : verts_[v] - p * w; };
+    const vec<3, coord> a = relative(i, ws.x), b = relative(j, ws.y), c = relative(k, ws.z);
     const coord u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
     const coord least = min(min(u, v), w), most = max(max(u, v), w);
     const mask left = !(least < 0), right = !(most > 0);
-    // The height over p times twice the area.
-    const coord above = (u * a.z + v * b.z + w * c.z) * select(left, coord(1), -1);
-    const mask is_under = (left | right) & (above > 0);
+    // The height over p times twice the area (and times w).
+    const coord side = select(left, coord(1), -1), above = (u * a.z + v * b.z + w * c.z) * side;
+    mask is_under = (left | right) & (above > 0);
+    if (!is_far)
+        is_under = is_under & ((u * (ws.x - w_near) + v * (ws.y - w_near) + w * (ws.z - w_near)) * side > 0);
     if (!any(is_under)) return false;
     // A face in the plane of p's own, its neighbour on a flat wall, is above p by rounding alone. Corners and p are
-    // known to eps of their size (cells_ sideways, zmax_ in height): with r and h the largest of the differences
-    // sideways and in height, an area is off by 4 r (cells_ + r) eps, and the sum by what follows.
+    // known to eps of their size (cells_ sideways, zmax_ or p's own in height, times the largest w): with r and h the
+    // largest of the differences sideways and in height, an area is off by 4 r (cells_ + r) eps, and the sum by what
+    // follows.
     constexpr double eps = std::numeric_limits<double>::epsilon();
+    const double wmax = std::max({std::fabs(ws.x), std::fabs(ws.y), std::fabs(ws.z)});
     coord r = 0, h = 0;
     for (const auto& d : {a, b, c}) r = max(r, max(abs(d.x), abs(d.y))), h = max(h, abs(d.z));
-    return is_under & (above > eps * (12 * r * (cells_ + r) * h + 4 * abs(u + v + w) * (zmax_ + h)));
+    const coord sideways = cells_ * wmax + r, height = max(zmax_, abs(p.z)) * wmax + h;
+    return is_under & (above > eps * (12 * r * sideways * h + 4 * abs(u + v + w) * height));
 }

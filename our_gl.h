@@ -63,9 +63,9 @@ struct Models : std::vector<const Model*> {
 // least 1/2 and its centre is within 1/2 of the origin.
 bool fit(std::vector<Model>& scene, const vec3& eye = {1, 1, 4}, const vec3& up = {0, 1, 0});
 
-// An orthographic camera, fitted: its projection and viewport are replaced so that the models fill all of size x size
-// pixels and of [0, screen_depth].
-Camera fitted(const Camera& camera, const Models& models, int size);
+// A light's camera, fitted: its projection and viewport are replaced so that the models, as far as they are before it
+// and within [-reach,reach]^2 of its projection, fill all of size x size pixels and of [0, screen_depth].
+Camera fitted(const Camera& camera, const Models& models, int size, double reach = INFINITY);
 
 // Those of the models of which the camera may see a part on a picture of so many pixels: judged by their boxes.
 Models seen_by(const Camera& camera, const Models& models, int width, int height);
@@ -242,9 +242,11 @@ Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& 
 
 // How far a texel of the shadow buffer may stand above a fragment without shadowing it, in units of depth: what the
 // slopes of receiver and caster explain. sb_p: the fragment on the light's screen; stored: what the buffer holds there;
-// face: the corners of the fragment's face, on the light's screen too.
-coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored,
-                   const vec3 (&face)[3]);
+// slope: of the fragment's face.
+coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored, const vec2& slope);
+
+// How much the depth of a face rises from pixel to pixel along x and y. corner: on a light's screen, homogeneous.
+vec2 depth_slope(const vec4 (&corner)[3]);
 
 // The exact shadow: faces sorted into the cells of a grid on the light's screen, so that the few that may stand between
 // a point and the light are found at once. No resolution, no bias: whether one does is decided on the face itself.
@@ -278,11 +280,13 @@ private:
         std::vector<Entry> entries;        // in each cell the nearest to the light first
     };
     int cells_ = 0;                          // a side
+    double side_ = 0;                        // of the light's screen, in cells: no more than there are
     int band_rows_ = 1;                      // of cells, in a band
     double scale_ = 1;                       // cells to a pixel of the light's screen
-    double zmax_ = 0;                        // the largest |z| of all vertices
+    double zmax_ = 0;                        // the largest |z| of all vertices that are not next to the light
     Models models_;
-    std::vector<vec3> verts_;                // x and y in cells
+    std::vector<vec3> verts_;                // x and y in cells; where ws_ are, homogeneous
+    std::vector<double> ws_;                 // of a light with a place
     std::vector<std::array<int, 3>> faces_;  // as indices of vertices
     std::vector<Band> bands_;
 };

@@ -131,6 +131,38 @@ TEST("cameras: the light along up, both ways, exactly and nearly") {
     for (const std::string& options : each("--light %,1,0", x)) check_no_acne(options);
 }
 
+// Spot and point lights anywhere: above, among and below the boxes of the yard, whose floor many of them have behind.
+TEST("lights: spot and point at forty places") {
+    Random r(14);
+    for (int k = 0; k < 40; k++) {
+        const std::string place = triple(r.point(k % 4 ? 1.5 : 6));
+        const std::string angle = std::array{",5", ",10", ",45", ",80", ",89"}[k % 5];
+        const std::string kind = std::array{"--spot ", "--beam square --spot ", "--point "}[k % 3];
+        the_yard.check_exact({kind + place + angle}, 0);
+    }
+    the_yard.check_exact({"--spot 1,2,1", "--point 1,2,1", "--spot 1,2,1 --beam square",
+                          "--light 1,1,1 --spot 1,2,1,60"}, 300);
+    for (const double n : {1., .1, .01, .001}) {  // a plane that is low under the light has no acne
+        const Scene plane(net({0, 1, 0}, {}, 8), "--no-fit");
+        plane.check_lit("--point 0," + std::to_string(n) + ",0,89 --eye 0,4,1", 800);
+        plane.check_lit("--spot 1.5," + std::to_string(n) + ",0,60 --eye 0,4,1", 400);
+    }
+}
+
+TEST("lights: half angles of 1e-6 and 89, on a surface, at a vertex, at the eye, at 1e6 and 1e-6, along up, at it") {
+    for (const std::string& kind : each("--% ", {"spot", "point"})) {
+        the_yard.check_exact(each(kind + "1,2,1,%", {"1e-6", "1e-3", "89"}), 0);
+        the_yard.check_exact(each(kind + "%", {".3,-.5,.75", "-.25,.5,.5", "1,1,4", "1e6,1e6,1e6"}), 0);
+        the_yard.check_exact(each(kind + "%", {"0,2,0", "0,-2,0,60"}), 0);
+        the_yard.check_exact({"--center .25,.125,.25 " + kind + ".25,.125000001,.25"}, 0);
+        the_yard.check_exact({kind + "1e-6,1e-6,1e-6"}, 0);
+        for (const std::string& far : each(kind + "%,%,%,1e-4", {"1e18", "1e100", "1e300"})) the_yard.good(far);
+        for (const std::string wrong : {"0,0,0", "1,2", "1,2,3,0", "1,2,3,-1", "1,2,3,90", "1,2,3,nan", "1,2,3,4,5",
+                                        "nan,0,0", "1e308,1e308,0"})
+            check_refused(the_yard, kind + wrong + " m.obj", 2, wrong == "0,0,0" ? "the light" : kind.substr(0, 6));
+    }
+}
+
 // Only the direction counts: the same bytes at any length that a double has, denormal ones too.
 TEST("cameras: tiny and huge up and light") {
     the_yard.check_same(each("--up 0,%,0", {"1", "1e-300", "4.9406564584124654e-324", "1e300", "1e307"}));

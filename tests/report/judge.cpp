@@ -11,13 +11,21 @@
 #include "scenes.h"
 
 // The same faces in the same order.
-static std::string copy_of(const Model& model, const vec3& n) {
+static std::string copy_of(const Model& model, const Model& fitted, const LightSource& light) {
     Obj copy;
-    std::string faces = "vn " + number(n.x) + ' ' + number(n.y) + ' ' + number(n.z) + '\n';
+    std::string faces;
     for (int face = 0; face < model.nfaces(); face++) {
-        faces += 'f';
-        for (int c = 0; c < 3; c++) faces += ' ' + std::to_string(copy.vertex(model.vert(face, c))) + "//1";
-        faces += '\n';
+        std::string corners = "f";
+        // Between its corners the way to a light next to a face turns; the face's own normal holds it up.
+        const vec3 a = fitted.vert(face, 0), own = cross(fitted.vert(face, 1) - a, fitted.vert(face, 2) - a);
+        for (int c = 0; c < 3; c++) {
+            const bool is_far = light.kind == LightSource::far_off;
+            const vec3 n = normalized(is_far ? light.at
+                                             : normalized(light.at - fitted.vert(face, c)) + normalized(own));
+            faces += "vn " + number(n.x) + ' ' + number(n.y) + ' ' + number(n.z) + '\n';
+            corners += ' ' + std::to_string(copy.vertex(model.vert(face, c))) + "//-" + std::to_string(3 - c);
+        }
+        faces += corners + '\n';
     }
     return copy.text() + faces;
 }
@@ -26,34 +34,42 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
     for (const char* option : {"-o", "--output", "--size", "--shadow-size", "--eye", "--center", "--up", "--zoom",
-                               "--light", "--shadow", "--bias", "--draw", "--only", "--threads", "--frames"})
+                               "--light", "--spot", "--point", "--beam", "--shadow", "--bias", "--draw", "--only",
+                               "--threads", "--frames"})
         values[option];
     bool fits = true;
+    std::string lamp;  // the last of three options that say which
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
         const auto option = values.find(*arg);
         const bool is_path = option == values.end() && (arg->size() < 2 || arg->front() != '-');
         (is_path ? paths : towards_light).push_back(*arg);
         if (*arg == "--no-fit") fits = false;
+        if (*arg == "--light" || *arg == "--spot" || *arg == "--point") lamp = *arg;
         if (option != values.end()) towards_light.push_back(option->second = *++arg);
     }
     if (std::sscanf(values["--size"].c_str(), "%d%*[xX]%d", &view.width, &view.height) == 1) view.height = view.width;
     std::sscanf(values["--zoom"].c_str(), "%lf", &view.zoom);
     std::sscanf(values["--threads"].c_str(), "%d", &threads);
-    for (const auto& [option, v] : {std::pair("--eye", &view.eye), {"--center", &view.center}, {"--up", &view.up},
-                                    {"--light", &light}})
+    double degrees = lamp == "--spot" ? 25 : 80;
+    std::sscanf(values[lamp].c_str(), "%lf,%lf,%lf,%lf", &light.at.x, &light.at.y, &light.at.z, &degrees);
+    if (lamp == "--point") light = {LightSource::point, light.at, degrees};
+    if (lamp == "--spot")
+        light = {values["--beam"] == "square" ? LightSource::square_spot : LightSource::round_spot, light.at, degrees};
+    for (const auto& [option, v] : {std::pair("--eye", &view.eye), {"--center", &view.center}, {"--up", &view.up}})
         std::sscanf(values[option].c_str(), "%lf,%lf,%lf", &v->x, &v->y, &v->z);
     if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     for (const std::string& path : paths) models.emplace_back(path);
     const std::vector<Model> as_loaded = models;
     const View usual;
     const bool has_up = !(view.up == usual.up);
-    if (fits && fit(models, has_up ? view.eye - view.center : usual.eye, view.up) && values["--light"].empty())
-        light = {1, 1, 1};
+    if (fits && fit(models, has_up ? view.eye - view.center : usual.eye, view.up) && lamp.empty())
+        light = vec3{1, 1, 1};
     for (std::size_t i = 0; i < models.size(); i++) {
         const std::string name = "copy" + std::to_string(i) + ".obj";
-        towards_light.push_back(folder.write(name, copy_of(as_loaded[i], normalized(light))));
+        towards_light.push_back(folder.write(name, copy_of(as_loaded[i], models[i], light)));
         models[i].move([&](const vec3& v) { return v - view.center; });
     }
+    if (light.kind != LightSource::far_off) light.at = light.at - view.center;
     view.eye = view.eye - view.center;
     view.center = {};
 }

@@ -9,7 +9,7 @@
 // all coordinates are relative to --center.
 struct Scene {
     View view;
-    vec3 light{1, 1, 0};
+    LightSource light{vec3{1, 1, 0}};
     int threads;
     Strings paths;
     std::vector<Model> models;

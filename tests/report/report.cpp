@@ -64,7 +64,7 @@ void measure_times(const Program& umbra, const Strings& scene, int rounds, std::
 
 void predict_errors(const Program& umbra, const Strings& arguments, std::vector<Figures>& figures) {
     const Scene scene(arguments, umbra);
-    const Theorist theorist(RayCaster(scene.models), scene.view, scene.light, scene.threads);
+    const Theorist theorist(RayCaster(scene.models), scene.view, scene.light.at, scene.threads);
     // The needles of the constant bias, up to sqrt(2)/25 of it long, are safe on surfaces of a slope up to 17.
     constexpr double short_texel = scene_bias / 25;
     const Theory constant = theorist.constant_bias(scene_bias, {short_texel, short_texel});

@@ -94,7 +94,7 @@ TEST("the scene is read from umbra's arguments, and a copy of each model turns i
     const Strings given{"--size", "30x20", "--light",  "0,3,4", "--shadow", "map",
                           "--eye",  "1,2,3", "--center", "0,0,1", "--zoom", "2"};
     const Scene scene(joined(given, {path, "--quiet"}), folder);
-    CHECK(scene.view.width == 30 && scene.view.height == 20 && scene.light == (vec3{0, 3, 4}));
+    CHECK(scene.view.width == 30 && scene.view.height == 20 && scene.light.at == (vec3{0, 3, 4}));
     CHECK(scene.view.eye == (vec3{1, 2, 2}) && scene.view.center == vec3{} && scene.view.up == (vec3{0, 1, 0}));
     CHECK(scene.paths == Strings{path});
     std::vector<Model> fitted(1, Model(path));
@@ -104,7 +104,7 @@ TEST("the scene is read from umbra's arguments, and a copy of each model turns i
     const Model copy(scene.towards_light.back()), original(path);
     for (int c = 0; c < 3; c++) CHECK(copy.vert(0, c) == original.vert(0, c) && copy.normal(0, c) == (vec3{0, .6, .8}));
     CHECK(scene.view.zoom == 2 && Scene({"--size", "7", path}, folder).view.height == 7);
-    CHECK(Scene({path}, folder).light == (vec3{1, 1, 1}));
+    CHECK(Scene({path}, folder).light.at == (vec3{1, 1, 1}));
     CHECK(Scene({"--no-fit", path}, folder).models.at(0).vert(0, 1) == (vec3{10, 0, 0}));
 }
 TEST("the frontier is what no other method beats, and of equals both") {

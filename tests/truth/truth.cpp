@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <stdexcept>
 #include <system_error>
@@ -87,11 +88,16 @@ void for_rows(int height, int threads, const std::function<void(int)>& body) {
     work();
 }
 
-vec3 View::direction(int px, int py) const {
-    const vec3 z = normalized(eye - center);
+// The axes of a camera that looks along -z.
+static std::array<vec3, 3> axes(const vec3& back, const vec3& up) {
+    const vec3 z = normalized(back);
     vec3 x = normalized(cross(up, z));
     if (!(norm(x) > 0)) x = normalized(cross(least_axis(z), z));
-    const vec3 y = cross(z, x);
+    return {x, cross(z, x), z};
+}
+
+vec3 View::direction(int px, int py) const {
+    const auto [x, y, z] = axes(eye - center, up);
     if (!(norm(x) > 0 && norm(y) > 0)) throw std::invalid_argument("a view without a direction");
     const double side = .75 * std::min(width, height) * zoom;
     return (center - eye) + x * ((2 * px + 1 - width) / side) + y * ((2 * py + 1 - height) / side);
@@ -325,24 +331,25 @@ std::optional<Hit> RayCaster::first_hit(const vec3& origin, const vec3& directio
 }
 
 // The own triangle would be found at t = 0, but only by exact arithmetic.
-bool RayCaster::blocked(const Ray& ray, int own, double beyond) const {
+bool RayCaster::blocked(const Ray& ray, int own, double beyond, double until) const {
     bool found = false;
     traverse(ray, [&](int number) {
         if (number != own) {
             const Meeting meeting(ray, triangles_[number]);
-            found = meeting.in_front && meeting.t > beyond;
+            found = meeting.in_front && meeting.t > beyond && meeting.t < until;
         }
         return found ? -1 : infinity;
     });
     return found;
 }
 
-bool RayCaster::occluded(int triangle, const vec3& weight, const vec3& direction) const {
-    return blocked(Ray(triangles_[triangle], weight, direction, nodes_[0]), triangle, -infinity);
+bool RayCaster::occluded(int triangle, const vec3& weight, const vec3& direction, double until) const {
+    return blocked(Ray(triangles_[triangle], weight, direction, nodes_[0]), triangle, -infinity, until);
 }
 
 bool RayCaster::occluded(const vec3& origin, const vec3& direction, double beyond) const {
-    return !triangles_.empty() && blocked(Ray({origin, origin, origin}, {1, 0, 0}, direction, nodes_[0]), -1, beyond);
+    if (triangles_.empty()) return false;
+    return blocked(Ray({origin, origin, origin}, {1, 0, 0}, direction, nodes_[0]), -1, beyond, infinity);
 }
 
 bool RayCaster::faces(int number, const vec3& direction) const {
@@ -353,11 +360,22 @@ bool RayCaster::faces(int number, const vec3& direction) const {
 
 // ---- pictures ----
 
-TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light, int threads) {
+LightSource::LightSource(Kind k, const vec3& place, double degrees)
+    : kind(k), at(place), tangent(std::tan(degrees * std::numbers::pi / 180)) {}
+
+bool LightSource::reaches(const vec3& p, const View& view) const {
+    const auto [x, y, z] = axes(at - view.center, view.up);
+    const double right = dot(p - at, x), above = dot(p - at, y), edge = -dot(p - at, z) * tangent;
+    if (kind == round_spot) return edge > 0 && right * right + above * above < edge * edge;
+    return kind == far_off || std::max(std::fabs(right), std::fabs(above)) < edge;
+}
+
+TruthImage cast(const RayCaster& caster, const View& view, const LightSource& light, int threads) {
     // Refused is what would make every ray meaningless; what is left cannot throw in a thread.
     if (view.width < 1 || view.height < 1) throw std::invalid_argument("a picture without pixels");
     (void)view.direction(0, 0);
-    if (!(largest(to_light) > 0 && std::isfinite(largest(to_light))))
+    const vec3 back = light.kind == LightSource::far_off ? light.at : light.at - view.center;
+    if (!(largest(back) > 0 && std::isfinite(largest(back))))
         throw std::invalid_argument("a light without a direction");
     const std::size_t pixels = static_cast<std::size_t>(view.width) * view.height;
     TruthImage image{view.width, view.height, std::vector<Truth>(pixels, Truth::background),
@@ -368,9 +386,16 @@ TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light,
             if (!hit) continue;
             const std::size_t i = static_cast<std::size_t>(y) * view.width + x;
             image.triangle[i] = hit->triangle;
-            image.pixel[i] = !caster.faces(hit->triangle, to_light)                  ? Truth::away
-                             : caster.occluded(hit->triangle, hit->weight, to_light) ? Truth::shadowed
-                                                                                     : Truth::lit;
+            // A surface that the light lies on throws no shadow; the way to the light is rounded to a few 2^-53 of it.
+            const bool is_far = light.kind == LightSource::far_off;
+            const double until = is_far ? infinity : 1 - 0x1p-40;
+            const bool reached = light.reaches(hit->point, view);
+            const vec3 to_light = is_far ? light.at : light.at - hit->point;
+            const bool dark = !reached && light.kind != LightSource::point;  // beside the beam
+            const vec3 from_plane = is_far ? light.at : light.at - caster.triangle(hit->triangle)[0];
+            image.pixel[i] = dark || !caster.faces(hit->triangle, from_plane) ? Truth::away
+                             : reached && caster.occluded(hit->triangle, hit->weight, to_light, until) ? Truth::shadowed
+                                                                                                       : Truth::lit;
         }
     });
     return image;

@@ -54,9 +54,10 @@ public:
     // one with the smaller number.
     std::optional<Hit> first_hit(const vec3& origin, const vec3& direction) const;
 
-    // Whether anything but the triangle itself lies in front (0 < t) of its point (w0*v0 + w1*v1 + w2*v2)/(w0+w1+w2)
-    // in the direction. The weights need a positive sum; the point may lie outside the triangle, in its plane.
-    bool occluded(int triangle, const vec3& weight, const vec3& direction) const;
+    // Whether anything but the triangle itself lies in front (0 < t < until) of its point (w0*v0 + w1*v1 + w2*v2)/
+    // (w0+w1+w2) in the direction. The weights need a positive sum; the point may lie outside the triangle, in its
+    // plane. Where until is finite t is a rounded number.
+    bool occluded(int triangle, const vec3& weight, const vec3& direction, double until = INFINITY) const;
 
     // Whether anything lies in front of a free point with beyond < t: what a comparison of depths with a bias decides.
     // Only here is t a rounded number.
@@ -77,7 +78,7 @@ private:
     void build(int node, int begin, int end);
     template <typename Visit>
     void traverse(const Ray& ray, Visit visit) const;
-    bool blocked(const Ray& ray, int own, double beyond) const;
+    bool blocked(const Ray& ray, int own, double beyond, double until) const;
 
     std::vector<Triangle> triangles_;
     std::vector<int> order_;   // their numbers, leaf after leaf
@@ -97,9 +98,20 @@ struct TruthImage {
     std::vector<int> triangle;  // the visible one, -1 for none
 };
 
-// What is visible at each pixel's centre, and whether that point of the surface sees the light. `to_light` points from
-// the scene to the light and need not be a unit vector. The result does not depend on the number of threads.
-TruthImage cast(const RayCaster& caster, const View& view, const vec3& to_light, int threads = 1);
+// A light far off in a direction, of any length; or one at a place, that looks at the view's center. Outside of a spot
+// light's beam all is `away`; outside of the square pyramid that a point light's shadows come from all is lit.
+struct LightSource {
+    enum Kind { far_off, round_spot, square_spot, point } kind;
+    vec3 at;
+    double tangent = 0;  // of the half angle
+    LightSource(const vec3& to_light) : kind(far_off), at(to_light) {}
+    LightSource(Kind k, const vec3& place, double degrees);
+    bool reaches(const vec3& p, const View& view) const;  // whether p is within the beam or the pyramid
+};
+
+// What is visible at each pixel's centre, and whether that point of the surface sees the light. The result does not
+// depend on the number of threads.
+TruthImage cast(const RayCaster& caster, const View& view, const LightSource& light, int threads = 1);
 
 // Calls body(row) for the rows [0,height), on several threads.
 void for_rows(int height, int threads, const std::function<void(int)>& body);

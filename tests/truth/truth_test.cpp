@@ -269,7 +269,7 @@ TEST("of layers any distance apart the nearer one is seen") {
         quad(mesh, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0});
         for (const bool swapped : {false, true}) {
             if (swapped) std::rotate(mesh.begin(), mesh.begin() + 2, mesh.end());
-            const TruthImage image = cast(RayCaster(mesh), {{.3, .4, 3}, {}, {0, 1, 0}, 50, 50}, {.5, .25, 1});
+            const TruthImage image = cast(RayCaster(mesh), {{.3, .4, 3}, {}, {0, 1, 0}, 50, 50}, vec3{.5, .25, 1});
             long seen[2] = {};
             for (const int triangle : image.triangle)
                 if (triangle >= 0) seen[triangle / 2]++;
@@ -299,7 +299,7 @@ TEST("grazing light on a plane makes no shadow") {
     constexpr double pixel = 2 / (.75 * 33);
     for (const double height : {0., .25}) {
         const Mesh mesh = grid(30, 15 * pixel, [&](const vec3& v) { return v + vec3{0, height, 0}; });
-        CHECK(all_lit(cast(RayCaster(mesh), {{0, 4, 0}, {}, {0, 0, -1}, 33, 33}, {1, 1e-4, .3}), 29 * 29));
+        CHECK(all_lit(cast(RayCaster(mesh), {{0, 4, 0}, {}, {0, 0, -1}, 33, 33}, vec3{1, 1e-4, .3}), 29 * 29));
     }
 }
 TEST("a convex body does not shadow itself, not even at a facet's edges") {
@@ -409,10 +409,10 @@ TEST("the view: the picture's corners, and an up that says nothing") {
 TEST("the number of threads does not matter") {
     const RayCaster caster(landscape(16) + sphere(10, 10, .4));
     const View view{{1, 1, 4}, {}, {0, 1, 0}, 97, 61};
-    const TruthImage one = cast(caster, view, {1, 1, 0}, 1);
+    const TruthImage one = cast(caster, view, vec3{1, 1, 0}, 1);
     CHECK(count(one, Truth::shadowed) > 100);
     for (const int threads : {2, 3, 7, 100}) {
-        const TruthImage many = cast(caster, view, {1, 1, 0}, threads);
+        const TruthImage many = cast(caster, view, vec3{1, 1, 0}, threads);
         CHECK(many.pixel == one.pixel && many.triangle == one.triangle && many.width == 97 && many.height == 61);
     }
 }
@@ -435,8 +435,31 @@ TEST("without triangles there is nothing to see") {
     CHECK_EQ(caster.ntriangles(), 0);
     CHECK(!caster.first_hit({}, {0, 0, 1}).has_value());
     CHECK(!caster.occluded({}, {0, 0, 1}, 0));
-    CHECK_EQ(count(cast(caster, {{1, 1, 4}, {}, {0, 1, 0}, 3, 2}, {1, 1, 0}), Truth::background), 6);
+    CHECK_EQ(count(cast(caster, {{1, 1, 4}, {}, {0, 1, 0}, 3, 2}, vec3{1, 1, 0}), Truth::background), 6);
 }
+// A plate above a floor, a light above both: the shadow is the plate seen from the light. Beside a spot light's beam
+// all is away, beside what a point light's shadows come from all is lit.
+TEST("a light at a place") {
+    const RayCaster caster(Mesh{{{{-9, 0, -9}, {0, 0, 9}, {9, 0, -9}}}, {{{-.5, 1, -.5}, {0, 1, 1}, {.5, 1, -.5}}}});
+    const View view{{0, 8, .001}, {}, {0, 0, -1}, 60, 60};
+    const auto check = [&](LightSource::Kind kind, double degrees, auto&& reached) {
+        const TruthImage image = cast(caster, view, {kind, {0, 2, 0}, degrees});
+        for (int i = 0; i < 3600; i++) {
+            if (image.triangle[i] != 0) continue;
+            const vec3 d = view.direction(i % 60, i / 60), p = view.eye - d * (view.eye.y / d.y);
+            const vec3 q = p * .5;  // where the way to the light goes through the plate's plane
+            const bool shadowed = q.z > -.5 && q.z < 1 - 3 * std::fabs(q.x);
+            const Truth outside = kind == LightSource::point ? Truth::lit : Truth::away;
+            CHECK(image.pixel[i] == (!reached(p) ? outside : shadowed ? Truth::shadowed : Truth::lit));
+        }
+    };
+    const auto square = [](const vec3& p) { return std::max(std::fabs(p.x), std::fabs(p.z)) < 2; };
+    check(LightSource::square_spot, 45, square);
+    check(LightSource::point, 45, square);
+    check(LightSource::round_spot, 45, [](const vec3& p) { return p.x * p.x + p.z * p.z < 4; });
+    check(LightSource::point, 89, [](const vec3&) { return true; });
+}
+
 TEST("meaningless input is refused") {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     CHECK_THROWS(RayCaster(Mesh{{{{0, 0, nan}, {1, 0, 0}, {0, 1, 0}}}}), "coordinate");
@@ -444,10 +467,10 @@ TEST("meaningless input is refused") {
     const RayCaster caster(box({-1, -1, -1}, {1, 1, 1}));
     CHECK_THROWS(caster.first_hit({}, {}), "direction");
     CHECK_THROWS(caster.first_hit({}, {nan, 1, 0}), "direction");
-    CHECK_THROWS(cast(caster, {{1, 2, 3}, {1, 2, 3}, {0, 1, 0}, 4, 4}, {1, 1, 0}, 2), "view");
-    CHECK_THROWS(cast(caster, {{1, 2, nan}, {}, {0, 1, 0}, 4, 4}, {1, 1, 0}, 2), "view");
-    CHECK_THROWS(cast(caster, {{1, 1, 4}, {}, {0, 1, 0}, 0, 4}, {1, 1, 0}, 2), "pixels");
-    CHECK_THROWS(cast(caster, {}, {0, 0, 0}, 2), "light");
+    CHECK_THROWS(cast(caster, {{1, 2, 3}, {1, 2, 3}, {0, 1, 0}, 4, 4}, vec3{1, 1, 0}, 2), "view");
+    CHECK_THROWS(cast(caster, {{1, 2, nan}, {}, {0, 1, 0}, 4, 4}, vec3{1, 1, 0}, 2), "view");
+    CHECK_THROWS(cast(caster, {{1, 1, 4}, {}, {0, 1, 0}, 0, 4}, vec3{1, 1, 0}, 2), "pixels");
+    CHECK_THROWS(cast(caster, {}, vec3{0, 0, 0}, 2), "light");
 }
 
 int main(int argc, char** argv) { return run_tests(argc, argv); }
