@@ -26,11 +26,11 @@ int count(const auto& array) { return static_cast<int>(array.size()); }
 // ---- text, line by line and word by word ----
 
 // Text from elsewhere, made fit for a message: at most 60 characters, none of them a control character.
-std::string in_quotes(std::string_view text) {
-    std::string out(text.substr(0, 60));
+std::string in_quotes(std::string_view text, std::size_t most = 60) {
+    std::string out(text.substr(0, most));
     for (char& c : out)
         if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
-    return "'" + out + (text.size() > 60 ? "...'" : "'");
+    return "'" + out + (text.size() > most ? "...'" : "'");
 }
 
 void add(Model::Notes& notes, const std::string& what, const std::string& which, int count = 1) {
@@ -39,7 +39,6 @@ void add(Model::Notes& notes, const std::string& what, const std::string& which,
     note.count += count;
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\0'; }  // '\0': see join_lines
 bool ends_word(char c) { return is_blank(c) || c == '\n' || c == '#'; }
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; }
@@ -47,10 +46,10 @@ std::string lower(std::string text) {
     for (char& c : text) c = lower(c);
     return text;
 }
-template <typename Char>
-Char* find(char c, Char* begin, Char* end) {
-    return static_cast<Char*>(std::memchr(begin, c, end - begin));
+std::string unquoted(std::string text) {
+    return text.size() > 2 && text.front() == '"' && text.back() == '"' ? text.substr(1, text.size() - 2) : text;
 }
+char* find(char c, char* begin, char* end) { return static_cast<char*>(std::memchr(begin, c, end - begin)); }
 
 // A line that ends in '\' goes on in the next one; not where it holds a '#', since a stray '\' in a comment must not
 // swallow a vertex. Both bytes become blanks, the newline '\0', which no text has: so lines can still be counted.
@@ -84,10 +83,13 @@ FileBytes read_text(const fs::path& path) {
     std::uint32_t faces = 0;  // of STL that is not text: 80 bytes, the number of faces, 50 bytes for each
     if (all.size() >= 84) std::memcpy(&faces, &all[80], 4);
     if (all.size() == 84 + 50 * std::uint64_t{faces}) refuse("STL");
-    if (all.empty() || all.back() != '\n') *text.end++ = '\n';
+    while (text.end > text.begin && text.end[-1] == '\0') text.end--;  // some programs fill up their last block
+    if (text.end == text.begin || text.end[-1] != '\n') *text.end++ = '\n';
     if (find('\0', text.begin, text.end)) refuse("binary");
     if (all.starts_with("\xEF\xBB\xBF")) text.begin += 3;  // UTF-8's byte order mark
-    if (find('\n', text.begin, text.end) == text.end - 1) std::replace(text.begin, text.end, '\r', '\n');
+    // Lines that end in '\r' alone, if the first ones do.
+    if (char* p = find('\r', text.begin, std::min(text.end, text.begin + 4096)); p && p[1] != '\n')
+        for (; p; p = find('\r', p + 1, text.end)) *p = p[1] == '\n' ? ' ' : '\n';
     join_lines(text.begin, text.end);
     return text;
 }
@@ -120,11 +122,11 @@ public:
     }
     std::string rest() {  // of the line, without blanks at its ends: a name may contain blanks and '#'
         at_end();
-        const char *const begin = at_, *end = at_ = find('\n', at_, end_);
+        char *const begin = at_, *end = at_ = find('\n', at_, end_);
         while (end > begin && is_blank(end[-1])) end--;
         std::string text(begin, end);
         std::replace(text.begin(), text.end(), '\0', ' ');
-        return text;
+        return unquoted(text);
     }
 
     // A finite number, or false. What is too small is zero or denormal.
@@ -133,7 +135,7 @@ public:
         if (error == std::errc::result_out_of_range)  // too large or too small: strtod says which
             value = std::strtod(std::string(after_plus(), end).c_str(), nullptr);
         if (error == std::errc::invalid_argument || !std::isfinite(value) || !ends_word(*end)) return false;
-        at_ = end;
+        at_ += end - at_;
         return true;
     }
     template <int size>
@@ -144,14 +146,10 @@ public:
         return n;
     }
     int integer(const char* what) {  // its magnitude is below 2^31
-        int small = 0;  // nearly all are short: reading them so takes .94 of the loading time
-        const char* p = at_;
-        for (; is_digit(*p) && p < at_ + 9; p++) small = small * 10 + (*p - '0');
-        if (p > at_ && !is_digit(*p)) return at_ = p, small;
         int value = 0;
         const auto [end, error] = std::from_chars(after_plus(), end_, value);
         if (error != std::errc()) fail_word(what);
-        at_ = end;
+        at_ += end - at_;
         return value;
     }
 
@@ -164,13 +162,12 @@ public:
     }
 
 protected:
-    const char *begin_, *at_, *end_;
+    char *begin_, *at_, *end_;
 
 private:
     const char* after_plus() const { return at_ + (*at_ == '+' && at_[1] != '-'); }
     std::string line() const {
-        const auto before = std::count_if(begin_, at_, [](char c) { return c == '\n' || c == '\0'; });
-        return std::to_string(before + 1);
+        return std::to_string(1 + std::count_if(begin_, at_, [](char c) { return c == '\n' || c == '\0'; }));
     }
 
     fs::path name_;
@@ -213,6 +210,10 @@ public:
             // o, g, lines, curves and what nobody knows are passed over
         }
         if (std::find(normals.begin(), normals.end(), vec3{}) != normals.end()) lacks_normals = true;
+        double brightest = 0;  // some write colours from 0 to 255
+        for (const vec3& c : colors) brightest = std::max({brightest, c.x, c.y, c.z});
+        for (vec3& c : colors)
+            for (int i = 0; i < 3; i++) c[i] = std::clamp(brightest > 1 ? c[i] / 255 : c[i], 0., 1.);
         if (group_) groups.resize(nfaces(), *group_);
         for (const auto& [position, vert] : forward_)
             if (vert >= count(verts)) fail_vertex(position);
@@ -234,9 +235,9 @@ private:
         if (n < 3) at_end() ? fail("a vertex needs three coordinates") : fail_word("finite number");
         if (!at_end()) note(notes, "a colour that is no number, left out");
         verts.push_back({v[0], v[1], v[2]});
-        if (n != 6 && colors.empty()) return;
+        if (n < 6 && colors.empty()) return;
         colors.resize(verts.size(), {1, 1, 1});
-        for (int i = 0; i < 3 && n == 6; i++) colors.back()[i] = std::clamp(v[3 + i], 0., 1.);
+        if (n >= 6) colors.back() = {v[3], v[4], v[5]};
     }
     template <int size>
     vec<size> vector(int least) {  // what follows is a weight
@@ -254,12 +255,12 @@ private:
         const int i = integer(what);
         return i > 0 ? i - 1 : i < 0 && i >= -defined ? defined + i : INT_MIN;
     }
-    [[noreturn]] void fail_vertex(const char* position) {
+    [[noreturn]] void fail_vertex(char* position) {
         at_ = position;
         fail(in_quotes(peek_word()) + " is none of the " + std::to_string(count(verts)) + " vertices, counted from 1");
     }
     Corner corner() {  // v, v/vt, v//vn or v/vt/vn; v/ and v// are seen too
-        const char* const begin = at_;
+        char* const begin = at_;
         Corner c{index("vertex index", count(verts)), -1, -1};
         if (c.vert < 0) fail_vertex(begin);
         if (c.vert >= count(verts)) forward_.push_back({begin, c.vert});
@@ -284,7 +285,7 @@ private:
     }
 
     std::optional<int> group_;  // since there has been one
-    std::vector<std::pair<const char*, int>> forward_;  // vertices not yet defined where they are used
+    std::vector<std::pair<char*, int>> forward_;  // vertices not yet defined where they are used
 };
 
 // ---- polygons ----
@@ -406,8 +407,7 @@ Face measure(const vec3& a, const vec3& b, const vec3& c) {
         return measure(a * .25, b * .25, c * .25);  // a difference has overflowed
     for (vec3& e : edges) e = normalized(e);
     // The largest of the three sines has the best-conditioned cross product. An edge's coordinates are off by 3 epsilon
-    // at most (half for the difference, the rest for the length and the quotient), which turns it by no more than 6: an
-    // angle of 12 may be none.
+    // at most (difference, length, quotient), which turns it by no more than 6: an angle of 12 may be none.
     Face face;
     double most = 12 * epsilon;
     for (int k = 0; k < 3; k++) {
@@ -536,7 +536,7 @@ std::string take_options(std::string_view text, Map& map) {
                 (*target)[i] = value, map.is_moved = true;
         }
     }
-    return std::string(text);
+    return unquoted(std::string(text));
 }
 
 // The path of a file that is named in another one, be it beside that or beside what that is a link to; empty where
@@ -549,7 +549,8 @@ fs::path found(const fs::path& from, std::string name) {
     std::error_code ignored;
     std::set<fs::path> places;
     for (const fs::path& folder : {from.parent_path(), fs::weakly_canonical(from, ignored).parent_path()}) {
-        if (fs::exists(folder / name, ignored)) return (folder / name).lexically_normal();
+        if (const auto s = fs::status(folder / name, ignored); fs::exists(s) && !fs::is_directory(s))
+            return (folder / name).lexically_normal();
         places.insert({folder, (folder / name).parent_path()});
     }
     fs::path best;
@@ -562,24 +563,26 @@ fs::path found(const fs::path& from, std::string name) {
 
 // The path of a picture that a file names, if it is a TGA file, or else of the TGA file of the same stem, or else
 // nothing, with a note. Other kinds are known by their first bytes, whatever the file's name.
-std::string picture(const fs::path& from, const std::string& name, Model::Notes& notes) {
-    std::string tga = fs::path(name).replace_extension(".tga").string(), kind;
-    for (const std::string& each : {name, tga}) {
-        const fs::path path = found(from, each);
-        const std::string other = other_picture_kind(path);
-        if (other.empty() && lower(path.extension().string()) == ".tga") return path.string();
-        if (!path.empty() && kind.empty()) kind = other + ":";
-    }
-    if (kind.empty()) add(notes, "a picture that is not there, left out", in_quotes(name));
-    else add(notes, "a picture that is not TGA, left out; to convert it",
-             "convert " + in_quotes(kind == ":" ? name : kind + name) + " " + in_quotes(tga));
+std::string picture(const fs::path& from, const fs::path& obj, const std::string& name, Model::Notes& notes) {
+    if (name.empty()) return "";
+    fs::path other;
+    for (const std::string& each : {name, fs::path(name).replace_extension(".tga").string()})
+        for (const fs::path& file : {from, obj}) {
+            const fs::path path = found(file, each);
+            if (lower(path.extension().string()) == ".tga" && other_picture_kind(path).empty()) return path.string();
+            if (other.empty()) other = path;
+        }
+    if (other.empty()) add(notes, "a picture that is not there, left out", in_quotes(name));
+    else add(notes, "a picture that is not TGA, left out until it is converted",
+             "convert " + in_quotes(other_picture_kind(other) + other.string(), 4096) + " " +
+                 in_quotes(fs::path(other).replace_extension(".tga").string(), 4096));
     return "";
 }
 
 // Adds the file's materials to the others; one of the same name is replaced.
-void read_mtl(const fs::path& path, Library& library) {
+void read_mtl(const fs::path& path, const fs::path& obj, Library& library) {
     static constexpr std::pair<const char*, int> maps[] = {
-        {"map_kd", diffuse_map}, {"map_ks", specular_map}, {"map_ke", glow_map}, {"norm", tangent_map},
+        {"map_kd", diffuse_map}, {"map_ns", specular_map}, {"map_ke", glow_map}, {"norm", tangent_map},
         {"map_bump", bump_map}, {"bump", bump_map}};
     const FileBytes text = read_text(path);
     MtlMaterial before_the_first, *material = &before_the_first;
@@ -601,7 +604,7 @@ void read_mtl(const fs::path& path, Library& library) {
             for (const auto& [keyword, map] : maps)
                 if (in.skip_word(keyword)) {
                     MtlMap& its = material->maps[map] = {};
-                    its.path = picture(path, take_options(in.rest(), its.map), material->notes);
+                    its.path = picture(path, obj, take_options(in.rest(), its.map), material->notes);
                 }
     }
 }
@@ -614,7 +617,7 @@ Library read_libraries(const fs::path& obj, const std::vector<std::string>& line
         const fs::path path = found(obj, std::string(name));
         if (path.empty()) return false;
         if (fs::is_other(path)) throw std::runtime_error(path.string() + ": is not a file");  // a pipe may never end
-        if (seen.insert(path).second) read_mtl(path, library);
+        if (seen.insert(path).second) read_mtl(path, obj, library);
         return true;
     };
     for (const std::string& line : lines)
@@ -670,7 +673,7 @@ void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, co
         maps[i] = mtl.maps[is_bump ? bump_map : i];
         for (fs::path file : {path, fs::weakly_canonical(path)})
             if (maps[i].path.empty() && fs::exists(file.replace_extension() += map_suffixes[i], ignored)) {
-                maps[i].path = picture(file, file.filename().string(), notes);
+                maps[i].path = picture(file, file, file.filename().string(), notes);
                 break;
             }
     }
@@ -683,6 +686,7 @@ void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, co
         if (!has_uvs) return add(notes, "no texture coordinates, so no textures", in_quotes(material.name));
         textures[maps[i].path].push_back({group.material, map_members[i]});
         material.*map_members[i] = maps[i].map;
+        if (i == diffuse_map && material.Kd == vec3{}) material.Kd = {1, 1, 1};  // black where a map is in its place
     }
 }
 
@@ -743,8 +747,3 @@ std::vector<std::string> Model::notes() const {
     return lines;
 }
 
-void Model::find_box() {
-    if (!verts_.empty()) low_ = high_ = verts_[0];
-    for (const vec3& v : verts_)
-        for (int i = 0; i < 3; i++) low_[i] = std::min(low_[i], v[i]), high_[i] = std::max(high_[i], v[i]);
-}

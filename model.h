@@ -30,7 +30,7 @@ struct Material {
     Map diffuse;       // NAME_diffuse.tga or map_Kd
     Map normal;        // NAME_nm.tga: object space, (r,g,b) = (x,y,z) from [0,255] to [-1,1]
     Map tangent;       // NAME_nm_tangent.tga, norm or map_Bump: tangent space
-    Map specular;      // NAME_spec.tga or map_Ks: the Phong exponent, first channel
+    Map specular;      // NAME_spec.tga or map_Ns: the Phong exponent, first channel
     Map glow;          // NAME_glow.tga or map_Ke: added after shading
 };
 
@@ -112,7 +112,11 @@ public:
     }
 
 private:
-    void find_box();
+    void find_box() {
+        if (!verts_.empty()) low_ = high_ = verts_[0];
+        for (const vec3& v : verts_)
+            for (int i = 0; i < 3; i++) low_[i] = std::min(low_[i], v[i]), high_[i] = std::max(high_[i], v[i]);
+    }
 
     std::vector<vec3> verts_, normals_, colors_;
     int given_normals_ = INT32_MAX;  // behind these come made ones

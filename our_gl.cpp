@@ -879,7 +879,8 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
 }
 
 vec2 depth_slope(const vec4 (&corner)[3]) {
-    const vec3 a = project(corner[0]), n = cross(project(corner[1]) - a, project(corner[2]) - a);
+    const auto at = [&](int i) { return corner[i].w == 1 ? corner[i].xyz() : project(corner[i]); };
+    const vec3 a = at(0), n = cross(at(1) - a, at(2) - a);
     return {-n.x / n.z, -n.y / n.z};
 }
 
@@ -922,11 +923,11 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
     }
 
     // The cells of each face's box, and the float above its largest z. A face that has a corner behind the light has a
-    // box of what is before it, and no largest z.
+    // box of what is before it, and infinity for its largest z.
     struct Extent {
         std::int16_t x0, x1, y0, y1;
         float zmax;
-        bool is_cut;
+        bool is_cut() const { return zmax == INFINITY; }
         int cells() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
     };
     const auto bound_of_cut = [&](const std::array<int, 3>& face, vec3& low, vec3& high, vec3& other) {
@@ -936,7 +937,7 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
             corners[k] = {v.x, v.y, v.z, ws_[face[k]]};
         }
         const int n = clip_polygon({3, 1, w_near}, corners, 3, cut);
-        low = {INFINITY, INFINITY, INFINITY}, high = -low;
+        low = n > 0 ? vec3{INFINITY, INFINITY, INFINITY} : vec3{}, high = -low;
         for (int k = 0; k < n; k++)
             for (int i = 0; i < 3; i++) {
                 low[i] = std::min(low[i], cut[k][i] / cut[k].w);
@@ -959,13 +960,14 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
             for (int i = first_face[m] + begin; i < first_face[m] + end; i++) {
                 bool is_cut = false;
                 vec3 a, b, c;  // the corners, or a box
-                for (const int v : faces_[i]) is_cut = is_cut || (!ws_.empty() && !(ws_[v] >= w_near));
+                for (int k = 0; k < 3 && !ws_.empty(); k++) is_cut = is_cut || !(ws_[faces_[i][k]] >= w_near);
                 if (!is_cut) a = on_screen(faces_[i][0]), b = on_screen(faces_[i][1]), c = on_screen(faces_[i][2]);
                 else bound_of_cut(faces_[i], a, b, c);
                 const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
                 const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
-                const float zmax = std::nextafter(static_cast<float>(std::max({a.z, b.z, c.z})), INFINITY);
-                extents[i] = {cell_of(x0), cell_of(x1), cell_of(y0), cell_of(y1), zmax, is_cut};
+                const float zmax =
+                    is_cut ? INFINITY : std::nextafter(static_cast<float>(std::max({a.z, b.z, c.z})), INFINITY);
+                extents[i] = {cell_of(x0), cell_of(x1), cell_of(y0), cell_of(y1), zmax};
                 own += extents[i].cells();
             }
             sum += own;
@@ -979,9 +981,10 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
     // its three edges, at least in part; asking costs more than it saves for a small one.
     const auto for_each_cell = [&](int face, int y_begin, int y_end, auto&& visit) {
         const Extent& box = extents[face];
-        const bool is_small = box.cells() <= 9 || box.is_cut;
-        const vec3 p[] = {on_screen(faces_[face][0]), on_screen(faces_[face][1]), on_screen(faces_[face][2])};
-        const double side = is_small ? 1 : area2(p[0], p[1], p[2]);
+        const bool is_small = box.cells() <= 9 || box.is_cut();
+        vec3 p[3];
+        for (int i = 0; i < 3 && !is_small; i++) p[i] = on_screen(faces_[face][i]);
+        const double side = area2(p[0], p[1], p[2]);
         for (int y = std::max<int>(y_begin, box.y0); y < std::min(y_end, box.y1 + 1); y++) {
             for (int x = box.x0; x <= box.x1; x++) {
                 bool outside = false;
@@ -1006,7 +1009,7 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
         for (int face = first_face[m] + begin; face < first_face[m] + end; face++) {
             const auto [i, j, k] = faces_[face];
             const Extent& box = extents[face];
-            if (!box.is_cut && !(std::fabs(area2(on_screen(i), on_screen(j), on_screen(k))) > 0)) continue;
+            if (!box.is_cut() && !(std::fabs(area2(on_screen(i), on_screen(j), on_screen(k))) > 0)) continue;
             for (int b = box.y0 / band_rows_; b <= box.y1 / band_rows_; b++) touching[part][b].push_back(face);
         }
     });

@@ -65,8 +65,9 @@ FileBytes read_file(const fs::path& path, std::size_t beyond) {
 
 std::string other_picture_kind(const fs::path& path) {
     static constexpr std::pair<std::string_view, const char*> kinds[] = {
-        {"\x89PNG", "png"}, {"\xFF\xD8\xFF", "jpeg"}, {"GIF8", "gif"}, {"BM", "bmp"}, {"RIFF", "webp"}, {"DDS ", "dds"},
-        {"II*", "tiff"}, {"MM", "tiff"}, {"8BPS", "psd"}, {"v/1\1", "exr"}, {"#?RA", "hdr"}};
+        {"\x89PNG", "png:"}, {"\xFF\xD8\xFF", "jpeg:"}, {"GIF8", "gif:"}, {"BM", "bmp:"}, {"RIFF", "webp:"},
+        {"DDS ", "dds:"},
+        {"II*", "tiff:"}, {"MM", "tiff:"}, {"8BPS", "psd:"}, {"v/1\1", "exr:"}, {"#?RA", "hdr:"}};
     char bytes[4] = {};
     std::ifstream(path, std::ios::binary).read(bytes, sizeof bytes);
     for (const auto& [first, kind] : kinds)

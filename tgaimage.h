@@ -25,7 +25,7 @@ struct FileBytes {
 // and must not become shorter while it is used. Throws std::runtime_error "FILE: what", also for 4 GiB or more.
 FileBytes read_file(const std::filesystem::path& path, std::size_t beyond);
 
-// "png", "jpeg" and so on where a file is such a picture, by its first bytes; else nothing.
+// "png:", "jpeg:" and so on, as ImageMagick calls them, where a file is such a picture by its first bytes; or nothing.
 std::string other_picture_kind(const std::filesystem::path& path);
 
 struct TGAColor {

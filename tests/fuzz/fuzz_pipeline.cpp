@@ -238,10 +238,16 @@ void draw_lesson(Input& in, bool many) {
     if (flags & 1) eye = in.vector(1e307), center = in.vector(1e307);
     if (flags & 2) up = in.vector(1e307);
     if (flags & 4) light = in.vector(1e307);
-    for (const auto& [name, v] : {std::pair("--eye", eye), {"--center", center}, {"--up", up}, {"--light", light}}) {
+    for (const auto& [name, v] : {std::pair("--eye", eye), {"--center", center}, {"--up", up}}) {
         if (!(norm(v) <= 1e307)) return;  // the command line refuses it
         option(name, exactly("%.17g,%.17g,%.17g", v));
     }
+    if (!(norm(light) <= 1e307)) return;
+    const int lamp = flags >> 5 & 3;  // twice a far one
+    const char* const angle = std::array{"", ",1e-6", ",45", ",89"}[more >> 5 & 3];
+    option(std::array{"--light", "--spot", "--point", "--light"}[lamp],
+           exactly("%.17g,%.17g,%.17g", light) + (lamp % 3 ? angle : ""));
+    if (more & 128) option("--beam", "square");
     const int shadow = (flags >> 3 & 3) % 3;
     option("--shadow", std::array{"map", "exact", "off"}[shadow]);
     if (more & 1 && shadow == 0)
@@ -256,7 +262,8 @@ void draw_lesson(Input& in, bool many) {
         check_grid(in, models, light, up);
     }
     words.push_back(file.path().string());
-    const bool refused = !std::isfinite(1 / norm(eye - center)) || light == vec3{};
+    const bool refused = !std::isfinite(1 / norm(eye - center)) ||
+                         (lamp % 3 ? !std::isfinite(1 / norm(light - center)) : light == vec3{});
     Bytes pictures[2];
     for (const int threads : {1, 3}) {
         option("--threads", std::to_string(threads));

@@ -393,7 +393,7 @@ SCENE(specular_exponents, "--size 144x108 --shadow off --no-fit --eye 0,0,4 --li
     for (int i = 0; i < 6; i++) {
         const std::string name = std::to_string(exponents[i]);
         s.write(name + ".tga", checkers(1, 1, rgb(exponents[i], exponents[i], exponents[i])));
-        s.materials += "newmtl e" + name + "\nKd .45 .35 .2\nmap_Ks " + name + ".tga\n";
+        s.materials += "newmtl e" + name + "\nKd .45 .35 .2\nmap_Ns " + name + ".tga\n";
         s.sphere("e" + name, {(i % 3 - 1) * 1.15, i < 3 ? .62 : -.62, 0}, .53, 20);
     }
 }

@@ -177,6 +177,7 @@ TEST("line ends, tabs, blanks, comments, continued lines, a byte order mark, wor
          "vv 1 2 3\nff 1 2 3\nvt\xC3\xA9 x\n\x01\x02\nf 1 2 3\nend\n", "0 1 2"},
         {"V 0 0 0\nV 1 0 0\nv 1 1 0\nVT 0 0\nVn 0 0 1\nF 1/1 2//1 3\n", "0/0 1 2"},
         {"v 0 0 0\rv 1 0 0\r# a comment\rv 1 1 0\r\rf 1 2 \\\r3\rf 3 2 1", "0 1 2, 2 1 0"},
+        {"# one line\nv 0 0 0\rv 1 0 0\r\nv 1 1 0\rf 1 2 3\n\n", "0 1 2"},
         {square + "#" + std::string(1500000, 'x') + "\nf 1 2" + blanks + "3\n", "0 1 2"},
         {square + "curv " + std::string(3000000, '1') + "\nf 1 2 3\n", "0 1 2"},
         {continued + "4", "0 1 2, 0 2 3"},
@@ -209,7 +210,8 @@ TEST("a file without a face, a missing file, a folder, a device and a binary fil
         check_errors({{obj, " no faces"}});
     std::string utf16;
     for (const char c : square) utf16 += {c, '\0'};
-    for (const std::string& obj : {utf16, square + "f 1 2 3\n" + std::string(1, '\0')})
+    CHECK_EQ(load(square + "f 1 2 3\n" + std::string(300, '\0')).nfaces(), 1);  // a last block, filled up
+    for (const std::string& obj : {utf16, square + "f 1 2 3\n" + std::string(1, '\0') + "\n"})
         check_errors({{obj, " is a binary file, not a text of vertices and faces"}});
     const std::string header(80, 'x'), face(50, '\1');
     for (const auto& [bytes, kind] : std::vector<std::pair<std::string, std::string>>{
@@ -307,8 +309,10 @@ TEST("what costs no geometry is a note: corners too few, indices of no normal or
     }
 }
 
-TEST("colours of vertices; whoever has none is white, and a weight is no colour") {
-    const Model m = load("v 0 0 0\nv 1 0 0 .5 .25 0\nv 1 1 0 2 -1 1 9\nv 0 1 0 9 .5 -1\nf 1 2 3\nf 1 2 4\n");
+TEST("colours of vertices, with alpha or not, up to 1 or to 255; whoever has none is white; a weight is no colour") {
+    const Model m = load("v 0 0 0\nv 1 0 0 .5 .25 0\nv 1 1 0 1 1 1 9\nv 0 1 0 1 .5 -1\nf 1 2 3\nf 1 2 4\n");
+    const Model bytes = load("v 0 0 0 255 0 51\nv 1 0 0 1 1 1\nv 1 1 0 900 0 0\nf 1 2 3\n");
+    CHECK(bytes.color(0, 0) == (vec3{1, 0, .2}) && bytes.color(0, 2) == (vec3{1, 0, 0}));
     CHECK(m.has_colors());
     CHECK_EQ(vertices({m.color(0, 0), m.color(0, 1), m.color(0, 2), m.color(1, 2)}),
              "v 1 1 1\nv 0.5 0.25 0\nv 1 1 1\nv 1 0.5 0\n");
@@ -621,7 +625,7 @@ TEST("a missing .mtl and a colour that is none are notes; mtllib lines have a na
                                   "Kd spectral a.rfl", "Kd xyz 1 1 1", "Ke 1 1 x"})
         CHECK_EQ(materials(folder.load("usemtl a\n" + face, "# a comment\r\nnewmtl a\r\n\r\n" + bad + "\r\n")),
                  "a 1 1 1; a colour that is no number, left out: m.mtl:4\n");
-    CHECK_THROWS(folder.load(face, std::string("newmtl a\0", 9)), "m.mtl: is a binary file");
+    CHECK_THROWS(folder.load(face, std::string("newmtl a\0b", 10)), "m.mtl: is a binary file");
     CHECK_THROWS(folder.load(face, "<html>"), "m.mtl: is a HTML or XML file");
     const std::string mtl = "\xEF\xBB\xBF" "Kd 1 1 1\nNEWMTL a\nKE .25 2 0\nkD 1\nKD .5\nNs 10\nillum 2";
     const Model glowing = folder.load("usemtl a\n" + face, mtl);
@@ -713,7 +717,7 @@ TEST("the maps of an .mtl, relative to it, before those by suffix") {
     folder.picture("lib/e.tga", 130);
     folder.picture("lib/bump.tga", 140);
     folder.write("lib/m.mtl",
-                 "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ks s.TGA\nnorm -bm 0.5 n.tga\n"
+                 "newmtl full\nmap_Kd -s 1 1 1 -o .5 -clamp on my maps\\a b.tga\nmap_Ns s.TGA\nnorm -bm 0.5 n.tga\n"
                  "map_Bump -bm 1 bump.tga\nmap_Ke -mm 0 1 -blendu off -type sphere -imfchan l e.tga \r\n"
                  "newmtl part\n  map_Kd\tmy maps/a b.tga\nnewmtl none\nmap_Kd gone.tga\nnewmtl none\nKa 0 0 0\n"
                  "newmtl bumpy\nBUMP bump.tga\n");
@@ -730,7 +734,7 @@ TEST("-s and -o of a map scale and shift it") {
     const Folder folder;
     folder.picture("a.tga", 1);
     const Model m = folder.load("usemtl a\n" + textured,
-                                "newmtl a\nmap_Kd -s 2 -o .5 .25 1 a.tga\nmap_Ks -o -1 -s 3 4 a.tga\n"
+                                "newmtl a\nmap_Kd -s 2 -o .5 .25 1 a.tga\nmap_Ns -o -1 -s 3 4 a.tga\n"
                                 "map_Ke -bm 7 -s x -o nan 1 a.tga\nmap_Bump a.tga\n");
     const Material& a = m.materials()[0];
     CHECK_EQ(maps(m), "1 -1 1 1 1; ");
@@ -762,25 +766,31 @@ TEST("a map is found by its last part in any case, beside a link's target, as .t
         for (const std::string name : {"t.png", "t.TGA", "t"}) {
             if (kind.empty() && name == "t.TGA") continue;  // then it is a bad TGA file
             folder.write(name, bytes);
-            CHECK_EQ(drawn(name), "-1 -1 -1 -1 -1; a picture that is not TGA, left out; to convert it: convert '" +
-                                      kind + name + "' 't.tga'\n");
+            CHECK_EQ(drawn(name), "-1 -1 -1 -1 -1; a picture that is not TGA, left out until it is converted: "
+                                  "convert '" + kind + (folder / name).string() + "' '" + (folder / "t.tga").string() +
+                                      "'\n");
             fs::remove(folder / name);
         }
     CHECK_EQ(drawn("gone.tga"), "-1 -1 -1 -1 -1; a picture that is not there, left out: 'gone.tga'\n");
-    CHECK_EQ(drawn(""), "-1 -1 -1 -1 -1; a picture that is not there, left out: ''\n");
+    CHECK_EQ(drawn(""), "-1 -1 -1 -1 -1; ");
+    CHECK_EQ(drawn("."), "-1 -1 -1 -1 -1; a picture that is not there, left out: '.'\n");
+    CHECK_EQ(drawn("-s 1 \"maps/Wood.tga\""), "10 -1 -1 -1 -1; ");
     folder.write("t.png", "\x89PNG");
     folder.picture("t.tga", 40);
     CHECK_EQ(drawn("t.png"), "40 -1 -1 -1 -1; ");
     folder.picture("m_diffuse.tga", 50);  // by its suffix, instead of what is left out
     CHECK_EQ(drawn("gone.tga").substr(0, 17), "50 -1 -1 -1 -1; a");
     folder.write("m_diffuse.tga", "\x89PNG");
-    CHECK_EQ(maps(folder.load(textured)), "-1 -1 -1 -1 -1; a picture that is not TGA, left out; to convert it: "
-                                          "convert 'png:m_diffuse.tga' 'm_diffuse.tga'\n");
+    CHECK_EQ(maps(folder.load(textured)).substr(0, 42), "-1 -1 -1 -1 -1; a picture that is not TGA,");
+    folder.write("maps/m.mtl", "newmtl a\nmap_Kd metal.TGA\nKd 0 0 0\n");  // that picture is beside the .obj
+    const Model far = folder.load("mtllib \"maps/m.mtl\"\n" + obj);
+    CHECK_EQ(maps(far), "20 -1 -1 -1 -1; ");
+    CHECK(far.materials()[0].Kd == (vec3{1, 1, 1}));  // black would leave nothing of the map
 
     std::error_code no_links;
     fs::create_directories(folder / "real");
     folder.write("real/x.obj", "mtllib x.mtl\nusemtl a\n" + textured);
-    folder.write("real/x.mtl", "newmtl a\nmap_Ks s.tga\n");
+    folder.write("real/x.mtl", "newmtl a\nmap_Ns s.tga\n");
     folder.picture("real/s.tga", 60);
     folder.picture("real/x_glow.tga", 70);
     fs::create_symlink(folder / "real/x.obj", folder / "link.obj", no_links);
@@ -792,7 +802,7 @@ TEST("a map is found by its last part in any case, beside a link's target, as .t
 
 TEST("a corrupt picture is an error, in a fixed order; what no face uses is not even noted") {
     const Folder folder;
-    const std::string mtl = "newmtl a\nmap_Ks gone.tga\nmap_Kd lost.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke x.jpg\n";
+    const std::string mtl = "newmtl a\nmap_Ns gone.tga\nmap_Kd lost.tga\nnewmtl unused\nmap_Kd bad.tga\nmap_Ke x.jpg\n";
     const std::string obj = textured + "usemtl a\nf 1/1 2/2 3/3\nusemtl unused\n";
     folder.write("bad.tga", "no picture");
     CHECK_EQ(maps(folder.load(obj, mtl)),
@@ -853,7 +863,7 @@ TEST("mutated files give a model or an error, never a crash; faces of random cor
     all_suffixes(folder);
     folder.picture("a b.tga", 9);
     const std::string mtl =
-        "newmtl a\nKd .5 .5 .5\nmap_Kd -s 1 1 1 a b.tga\nmap_Bump m_nm.tga\nnewmtl b\nmap_Ks m_spec.tga\nKd 1\n";
+        "newmtl a\nKd .5 .5 .5\nmap_Kd -s 1 1 1 a b.tga\nmap_Bump m_nm.tga\nnewmtl b\nmap_Ns m_spec.tga\nKd 1\n";
     const std::string obj = "# head\nmtllib m.mtl\n" + cube() + full_square +
                             "usemtl a\nf 1/1/1 3/2/2 4/3/3 2/1\ng x\nusemtl b\nf -8//1 -7 -6 -5 6\nf 1 2 \\\n 6 5\n"
                             "f 3 7 8\nusemtl a\nf 1 5 7\n";
