@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -21,8 +20,8 @@
 struct Options {  // the lesson's scene; the command line can change each of these
     int width = 800, height = 800;  // of the picture, in pixels
     int shadow_size = 800;          // of the shadow buffer, in pixels a side
-    enum class Light { directional, spot, point } light = Light::directional;
-    vec3 light_dir{1, 1, 0};  // from center towards the light; where a spot or point light has its place, all the way
+    enum class Light { far, spot, point } light = Light::far;
+    vec3 light_dir{1, 1, 0};  // from center towards the light; to a spot or point light, which has a place, all the way
     double half_angle = 0;    // of a spot light's beam, or of what a point light's shadow buffer sees; in degrees
     bool square_beam = false;
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
@@ -60,15 +59,10 @@ struct Shadow {  // what the first pass leaves for the second
 
 // ---- pass 2: what the viewer sees ----
 
-// A light is a camera. A directional one is infinitely far off, so it has no perspective; the others stand at their
-// place and see as far as reach to each side, in the plane through center.
+// A light is a camera. One that is infinitely far off has no perspective; what another reaches comes to [-1,1]^2.
 static Camera light_camera(const Options& opt) {
-    const double distance = opt.light == Options::Light::directional ? INFINITY : norm(opt.light_dir);
-    return {lookat(opt.light_dir, opt.center, opt.up), projection(-1 / distance)};
-}
-static double reach(const Options& opt) {
-    if (opt.light == Options::Light::directional) return INFINITY;
-    return norm(opt.light_dir) * std::tan(opt.half_angle * std::numbers::pi / 180);
+    return {lookat(opt.light_dir, opt.center, opt.up),
+            opt.light == Options::Light::far ? projection(0) : beam(norm(opt.light_dir), opt.half_angle)};
 }
 
 // Phong's reflection model with the lesson's weights, in eye coordinates. What a material has no map for is not
@@ -97,7 +91,7 @@ struct PhongShader final : IShader {
           uniform_MIT(invert_transpose(uniform_M).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
           uniform_Mbeam(light_camera(o).to_clip() * camera.from_screen()),
-          uniform_light(o.light == Options::Light::directional
+          uniform_light(o.light == Options::Light::far
                             ? normalized((uniform_M * direction(normalized(o.light_dir))).xyz())
                             : (uniform_M * point(o.light_dir)).xyz()),
           grid_face(shadow.grid.first_face(m)) {}
@@ -113,7 +107,7 @@ struct PhongShader final : IShader {
         if (!material->normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
         if (model.has_colors()) varying_color[nthvert] = model.color(iface, nthvert);
-        if (material->tangent || opt.light != Options::Light::directional)
+        if (material->tangent || opt.light != Options::Light::far)
             varying_eye[nthvert] = (uniform_M * point(v)).xyz();
     }
 
@@ -148,15 +142,14 @@ struct PhongShader final : IShader {
     }
 
     vec<3, real> light_vector(const Fragment& f) const {  // towards the light, of length 1
-        if (opt.light == Options::Light::directional) return {uniform_light.x, uniform_light.y, uniform_light.z};
+        if (opt.light == Options::Light::far) return {uniform_light.x, uniform_light.y, uniform_light.z};
         return to_real(normalized(uniform_light - interpolated(varying_eye, f.bar)));
     }
 
     mask in_beam(const Fragment& f) const {  // of a spot light; the others have none
         if (opt.light != Options::Light::spot) return true;
         const vec<4, coord> p = uniform_Mbeam * point(f.screen);
-        const coord edge = p.w * reach(opt);
-        return (p.w > 0) & (opt.square_beam ? max(abs(p.x), abs(p.y)) < edge : p.x * p.x + p.y * p.y < edge * edge);
+        return (p.w > 0) & (opt.square_beam ? max(abs(p.x), abs(p.y)) < p.w : p.x * p.x + p.y * p.y < p.w * p.w);
     }
 
     mask in_light(const Fragment& f) const {
@@ -206,11 +199,11 @@ static void first_pass(const Options& opt, const Models& casters, Shadow& shadow
     if (casters.empty()) return;
     shadow.method = opt.method;
     const bool exact = opt.method == Options::Method::exact;
-    const bool classic = opt.bias && opt.light == Options::Light::directional;
+    const bool classic = opt.bias && opt.light == Options::Light::far;
     const int size = exact ? LightGrid::good_cells(casters) : opt.shadow_size;
     Camera light = light_camera(opt);
     light.Viewport = middle_viewport(size, size);
-    if (!classic) light = fitted(light, casters, size, reach(opt));
+    if (!classic) light = fitted(light, casters, size);
     shadow.M = light.to_screen();
     shadow.aspect = light.Projection[1][1] / light.Projection[0][0];
     if (exact) {
@@ -284,7 +277,7 @@ struct Value {
         char rest;
         vec3& v = o.light_dir;
         const int n = std::sscanf(text.c_str(), "%lf,%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &half_angle, &rest);
-        if (kind == Options::Light::directional || n == 3) Value{option, text}.read(v);
+        if (kind == Options::Light::far || n == 3) Value{option, text}.read(v);
         else if (n != 4 || !(half_angle > 0 && half_angle <= 89)) fail("X,Y,Z or X,Y,Z,DEG, DEG up to 89");
         else if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
         o.light = kind, o.half_angle = half_angle, o.own_light = true;
@@ -320,7 +313,7 @@ static const Option options[] = {
     {"--zoom", "F", "magnifies about the middle, which a nearer eye does not (1)",
      [](Options& o, const Value& v) { v.read_zoom(o.zoom); }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
-     [](Options& o, const Value& v) { v.read_light(o, Options::Light::directional, 0); }},
+     [](Options& o, const Value& v) { v.read_light(o, Options::Light::far, 0); }},
     {"--spot", "X,Y,Z[,DEG]", "a spot light's place and the half angle of its beam, which goes to the center (25)",
      [](Options& o, const Value& v) { v.read_light(o, Options::Light::spot, 25); }},
     {"--point", "X,Y,Z[,DEG]", "a point light's place, and how far around it has shadows, from the center on (80)",
@@ -376,7 +369,7 @@ static Options parse(int argc, char** argv) {
     }
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
     if (opt.bias && opt.method != Options::Method::map) throw UsageError("--bias belongs to --shadow map");
-    const bool is_far = opt.light == Options::Light::directional;
+    const bool is_far = opt.light == Options::Light::far;
     if (is_far && opt.light_dir == vec3{}) throw UsageError("--light has no direction");
     if (!is_far && !std::isfinite(1 / norm(opt.light_dir - opt.center)))
         throw UsageError("the light and --center are at the same point");
@@ -423,12 +416,11 @@ static Scene load(const Options& opt) {
 // What the scene does not need is left out from here on.
 static void leave_out(const Options& opt, Scene& scene) {
     scene.seen = seen_by(viewer(opt), scene.models, opt.width, opt.height);
-    if (opt.method != Options::Method::off && opt.light == Options::Light::directional)
+    if (opt.method != Options::Method::off && opt.light == Options::Light::far)
         scene.casters = casters(scene.models, scene.seen, lookat(opt.light_dir, opt.center, opt.up));
-    if (opt.method != Options::Method::off && opt.light != Options::Light::directional) {
+    if (opt.method != Options::Method::off && opt.light != Options::Light::far) {
         Camera light = light_camera(opt);
-        const double side = 1 / reach(opt);  // so the beam comes to [0,1]^2
-        light.Viewport = viewport(.5 - side / 2, .5 - side / 2, side, side);
+        light.Viewport = viewport(0, 0, 1, 1);
         scene.casters = scene.seen.empty() ? Models() : seen_by(light, scene.models, 1, 1);
     }
     if (opt.only == Options::Only::depth) scene.seen.clear();
@@ -554,7 +546,7 @@ static void run(Options opt) {
     }
     for (Model& model : scene.models) model.move([&](const vec3& v) { return v - opt.center; });
     // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
-    if (opt.light != Options::Light::directional) opt.light_dir = opt.light_dir - opt.center;
+    if (opt.light != Options::Light::far) opt.light_dir = opt.light_dir - opt.center;
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
     leave_out(opt, scene);
     const double loaded = milliseconds();

@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <numbers>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
@@ -28,6 +29,13 @@ mat4 lookat(const vec3& eye, const vec3& center, const vec3& up) {
 }
 
 mat4 projection(double c) { return {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, c, 1}}}; }
+
+mat4 beam(double distance, double half_angle) {
+    const double reach = distance * std::tan(half_angle * std::numbers::pi / 180);  // in the plane of the center
+    mat4 m = projection(-1 / distance);
+    m[0].x = m[1].y = 1 / reach;
+    return m;
+}
 
 mat4 viewport(double x, double y, double w, double h) {
     const double d = screen_depth;
@@ -82,7 +90,7 @@ bool fit(std::vector<Model>& scene, const vec3& eye, const vec3& up) {
 // visible down to a quarter of a millionth of the viewing distance.
 static constexpr double w_near = 1. / (1 << 22);
 
-Camera fitted(const Camera& camera, const Models& models, int size, double reach) {
+Camera fitted(const Camera& camera, const Models& models, int size) {
     constexpr double inf = std::numeric_limits<double>::infinity();
     const mat4 to_clip = camera.to_clip();
     const double c = camera.Projection[3].z;  // 0: orthographic
@@ -97,16 +105,17 @@ Camera fitted(const Camera& camera, const Models& models, int size, double reach
     vec3 low{inf, inf, inf}, high{-inf, -inf, -inf};
     for_each_vertex([&](const vec4& p) {
         const bool is_before = p.w >= nearest;
-        const vec3 q = c == 0 ? p.xyz() : is_before ? project(p) : vec3{reach, reach, (nearest - 1) / c / nearest};
+        const vec3 q = c == 0 ? p.xyz() : is_before ? project(p) : vec3{1, 1, (nearest - 1) / c / nearest};
         for (int i = 0; i < 3; i++) {
             low[i] = std::min(low[i], is_before || i == 2 ? q[i] : -q[i]);
             high[i] = std::max(high[i], q[i]);
         }
     });
-    for (int i = 0; i < 2; i++) low[i] = std::max(low[i], -reach), high[i] = std::min(high[i], reach);
+    for (int i = 0; i < 2 && c != 0; i++) low[i] = std::max(low[i], -1.), high[i] = std::min(high[i], 1.);
     mat4 to_cube = mat4::identity();
     double largest = 0;
-    for (int i = 0; i < 3; i++) largest = std::max({largest, std::fabs(low[i]), std::fabs(high[i])});
+    for (int i = 0; i < 3; i++)
+        largest = std::max(largest, std::max(std::fabs(low[i]), std::fabs(high[i])) / camera.Projection[i][i]);
     for (int i = 0; i < 3; i++) {  // the box [low,high] to [-1,1]^3
         double half = high[i] / 2 - low[i] / 2;
         // What is flat as the light sees it has a depth of rounding alone, which must not be blown up: it is some 2^-50

@@ -29,6 +29,10 @@ mat4 lookat(const vec3& eye, const vec3& center, const vec3& up);
 // only bends what is before and behind it more: to see a scene larger, zoom.
 mat4 projection(double c);
 
+// The same for a light at that distance from the center: what is within so many degrees of its axis, to each side,
+// comes to [-1,1]^2.
+mat4 beam(double distance, double half_angle);
+
 mat4 translation(const vec3& by);
 
 // Takes [-1,1]^3 to [x,x+w] x [y,y+h] x [0,screen_depth]; x, y, w, h in pixels.
@@ -63,9 +67,9 @@ struct Models : std::vector<const Model*> {
 // least 1/2 and its centre is within 1/2 of the origin.
 bool fit(std::vector<Model>& scene, const vec3& eye = {1, 1, 4}, const vec3& up = {0, 1, 0});
 
-// A light's camera, fitted: its projection and viewport are replaced so that the models, as far as they are before it
-// and within [-reach,reach]^2 of its projection, fill all of size x size pixels and of [0, screen_depth].
-Camera fitted(const Camera& camera, const Models& models, int size, double reach = INFINITY);
+// A light's camera, fitted: its projection and viewport are replaced so that the models, or with a perspective what of
+// them is before it and in [-1,1]^2, fill all of size x size pixels and of [0, screen_depth].
+Camera fitted(const Camera& camera, const Models& models, int size);
 
 // Those of the models of which the camera may see a part on a picture of so many pixels: judged by their boxes.
 Models seen_by(const Camera& camera, const Models& models, int width, int height);

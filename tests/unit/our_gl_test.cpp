@@ -4,6 +4,17 @@
 #include "random.h"
 
 #include <atomic>
+#include <numbers>
+
+// A scene of one triangle for each three corners, each a model.
+static std::vector<Model> triangles(const std::vector<vec3>& corners, double scale = 1) {
+    std::vector<Model> scene;
+    for (std::size_t i = 0; i < corners.size(); i += 3)
+        scene.emplace_back(std::vector{corners[i] * scale, corners[i + 1] * scale, corners[i + 2] * scale},
+                           std::vector<vec2>(), std::vector<vec3>(1, vec3{0, 0, 1}),
+                           std::vector<Model::Corner>{{0, -1, 0}, {1, -1, 0}, {2, -1, 0}});
+    return scene;
+}
 
 TEST("lookat takes center to the origin and eye to the +z axis") {
     Random r(1);
@@ -36,6 +47,36 @@ TEST("the projection divides by 1 - z/d") {
     CHECK(projection(0) == mat4::identity());
 }
 
+TEST("a beam's border is where it says, at any depth, and the camera of a light is fitted within it") {
+    for (const double angle : {1e-6, 5., 45., 89.})
+        for (const double z : {-5., 0., 1.9}) {
+            const double side = (2 - z) * std::tan(angle * std::numbers::pi / 180);
+            const vec4 p = beam(2, angle) * point(vec3{side, -side, z});
+            CHECK_NEAR(p.x / p.w, 1, 1e-12);
+            CHECK_NEAR(p.y / p.w, -1, 1e-12);
+        }
+    Random r(3);
+    for (int k = 0; k < 200; k++) {
+        std::vector<vec3> corners;
+        for (int i = 0; i < 30; i++) corners.push_back(r.point(1));
+        const std::vector<Model> scene = triangles(corners);
+        const vec3 place = r.point(3);
+        const Camera unfitted{lookat(place, {}, {0, 1, 0}), beam(norm(place), 40)}, light = fitted(unfitted, scene, 100);
+        double left = 100, right = 0;
+        bool crosses = false;
+        for (const vec3& v : corners) {
+            const vec4 p = unfitted.to_clip() * point(v);
+            crosses = crosses || p.w < .01;
+            if (p.w < .01 || std::max(std::fabs(p.x), std::fabs(p.y)) > p.w) continue;
+            const vec3 s = project(light.to_screen() * point(v));
+            for (const double c : {s.x, s.y}) left = std::min(left, c), right = std::max(right, c);
+            CHECK(s.z > -1e-9);
+        }
+        CHECK(left > -1e-9 && right < 100 + 1e-9);
+        CHECK(crosses || right - left > 1);
+    }
+}
+
 TEST("the viewport's corners") {
     Random r(2);
     for (int k = 0; k < 8000; k++) {
@@ -44,16 +85,6 @@ TEST("the viewport's corners") {
         const vec4 p = viewport(x, y, w, h) * point(vec3{i * 2. - 1, j * 2. - 1, l * 2. - 1});
         CHECK_NEAR(norm(p.xyz() - vec3{x + i * w, y + j * h, l * screen_depth}), 0, 1e-12);
     }
-}
-
-// A scene of one triangle for each three corners, each a model.
-static std::vector<Model> triangles(const std::vector<vec3>& corners, double scale = 1) {
-    std::vector<Model> scene;
-    for (std::size_t i = 0; i < corners.size(); i += 3)
-        scene.emplace_back(std::vector{corners[i] * scale, corners[i + 1] * scale, corners[i + 2] * scale},
-                           std::vector<vec2>(), std::vector<vec3>(1, vec3{0, 0, 1}),
-                           std::vector<Model::Corner>{{0, -1, 0}, {1, -1, 0}, {2, -1, 0}});
-    return scene;
 }
 
 // Where the default eye sees a vertex: within the middle square, [-1,1]^2, at most 1.
