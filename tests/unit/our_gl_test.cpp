@@ -61,7 +61,8 @@ TEST("a beam's border is where it says, at any depth, and the camera of a light 
         for (int i = 0; i < 30; i++) corners.push_back(r.point(1));
         const std::vector<Model> scene = triangles(corners);
         const vec3 place = r.point(3);
-        const Camera unfitted{lookat(place, {}, {0, 1, 0}), beam(norm(place), 40)}, light = fitted(unfitted, scene, 100);
+        const Camera unfitted{lookat(place, {}, {0, 1, 0}), beam(norm(place), 40)};
+        const Camera light = fitted(unfitted, scene, 100);
         double left = 100, right = 0;
         bool crosses = false;
         for (const vec3& v : corners) {
