@@ -433,6 +433,12 @@ SCENE(fences, "--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0
 // ... but with the lesson's constant as the bias the lowest one does not, and the others not at their foot.
 PICTURE(fences_lesson_bias, fences, "--size 480x320 --shadow-size 1024 --bias 43.34 --eye -.3,1.6,1.6 --light 2,1,0")
 
+// A spot light whose beam ends on the floor, round and square; a point light between the things, one of which is behind
+// it as it looks at the center.
+PICTURE(spot_round, add_yard, "--size 128x128 --shadow-size 512 --no-fit --eye 1,1.8,5 --spot 2,3,1.5,14")
+PICTURE(spot_square, add_yard, "--size 128x128 --shadow exact --no-fit --eye 1,1.8,5 --spot 2,3,1.5,14 --beam square")
+PICTURE(point_light, add_yard, "--size 128x128 --shadow-size 512 --no-fit --eye 1,1.8,5 --point .4,.5,.7")
+
 // The light is right above, in the direction of up: the shadow of a table is under it.
 SCENE(light_along_up, "--size 128x128 --shadow-size 512 --no-fit --eye .6,1.5,4 --light 0,1,0") {
     s.quad("grey", {-1, -.6, 1}, {1, -.6, 1}, {1, -.6, -1}, {-1, -.6, -1});
