@@ -15,6 +15,7 @@
 #include <vector>
 #if __has_include(<sys/ioctl.h>)
 #include <sys/ioctl.h>
+#include <unistd.h>
 #endif
 
 struct Options {  // the lesson's scene; the command line can change each of these
@@ -29,11 +30,18 @@ struct Options {  // the lesson's scene; the command line can change each of the
     enum class Method { map, exact, off } method = Method::map;  // of shadows
     std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
-    std::vector<std::filesystem::path> models;
+    struct Placed {
+        std::filesystem::path path;
+        vec3 at;
+        double turn = 0, scale = 1;  // about up, in degrees
+    };
+    std::vector<Placed> models;
     std::filesystem::path out = ".";
     enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
     bool own_light = false, tangent = false, fit = true, show = false, quiet = false, help = false, version = false;
-    int threads = 0, frames = 1;  // 0: all processors
+    int threads = 0;  // 0: all processors
+    int frames = 1, first_frame = 0, end_frame = 1;
+    enum class Move { nothing, object, camera, light } move = Move::nothing;  // goes round up once in so many frames
 };
 
 // ---- pass 1: what the light sees ----
@@ -88,7 +96,7 @@ struct PhongShader final : IShader {
 
     PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m)
         : IShader(m), opt(o), shadow(s), uniform_M(camera.ModelView), uniform_PM(camera.to_clip()),
-          uniform_MIT(invert_transpose(uniform_M).value()),
+          uniform_MIT(invert_transpose(uniform_M * m.turn).value()),
           uniform_Mshadow(shadow.M * camera.from_screen()),  // M*(Viewport*Projection*ModelView).invert()
           uniform_Mbeam(light_camera(o).to_clip() * camera.from_screen()),
           uniform_light(o.light == Options::Light::far
@@ -196,8 +204,8 @@ static Camera viewer(const Options& opt) {
 // Rendering the shadow buffer: the camera stands at the light. It is fitted to the casters, so that no texel is wasted;
 // but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
 static void first_pass(const Options& opt, const Models& casters, Shadow& shadow) {
+    shadow.method = casters.empty() ? Options::Method::off : opt.method;
     if (casters.empty()) return;
-    shadow.method = opt.method;
     const bool exact = opt.method == Options::Method::exact;
     const bool classic = opt.bias && opt.light == Options::Light::far;
     const int size = exact ? LightGrid::good_cells(casters) : opt.shadow_size;
@@ -242,7 +250,7 @@ struct Value {
         char rest;  // what follows the last number, which nothing should
         if (std::sscanf(text.c_str(), "%lf%c", &n, &rest) != 1 || !std::isfinite(n)) fail("a number");
     }
-    void read_zoom(double& n) const {
+    void read_factor(double& n) const {
         read(n);
         if (n < 1e-6 || n > 1e6) fail("1e-6 to 1e6");
     }
@@ -250,6 +258,11 @@ struct Value {
         char rest;
         if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < least || n > most)
             fail(std::to_string(least) + " to " + std::to_string(most));
+    }
+    void read_frames(int& n, int& first, int& end) const {
+        char rest;
+        if (std::sscanf(text.c_str(), "%5d:%5d/%5d%c", &first, &end, &n, &rest) != 3) read(n, 9999), first = 0, end = n;
+        if (first < 0 || first >= end || end > n || n > 9999) fail("N or A:B/N, 0 <= A < B <= N <= 9999");
     }
     void read_size(int& w, int& h) const {
         char x = 'x', rest;
@@ -272,6 +285,10 @@ struct Value {
         if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3)
             fail("three numbers X,Y,Z joined by commas, as in 1,1,0");
         if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
+    }
+    Options::Placed& last_model(Options& o) const {
+        if (o.models.empty()) throw UsageError(option + ": there is no model before it");
+        return o.models.back();
     }
     void read_light(Options& o, Options::Light kind, double half_angle) const {
         char rest;
@@ -311,7 +328,13 @@ static const Option options[] = {
     {"--up", "X,Y,Z", "what appears upwards; 0,0,0: the axis that the view is least along (0,1,0)",
      [](Options& o, const Value& v) { v.read(o.up); }},
     {"--zoom", "F", "magnifies about the middle, which a nearer eye does not (1)",
-     [](Options& o, const Value& v) { v.read_zoom(o.zoom); }},
+     [](Options& o, const Value& v) { v.read_factor(o.zoom); }},
+    {"--at", "X,Y,Z", "where the model before it stands (0,0,0)",
+     [](Options& o, const Value& v) { v.read(v.last_model(o).at); }},
+    {"--turn", "DEG", "how far the model before it is turned about up (0)",
+     [](Options& o, const Value& v) { v.read(v.last_model(o).turn); }},
+    {"--scale", "F", "how much larger the model before it is made (1)",
+     [](Options& o, const Value& v) { v.read_factor(v.last_model(o).scale); }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
      [](Options& o, const Value& v) { v.read_light(o, Options::Light::far, 0); }},
     {"--spot", "X,Y,Z[,DEG]", "a spot light's place and the half angle of its beam, which goes to the center (25)",
@@ -334,8 +357,10 @@ static const Option options[] = {
      [](Options& o, const Value&) { o.fit = false; }},
     {"--threads", "N", "the pictures are the same at any number (0, all processors)",
      [](Options& o, const Value& v) { v.read(o.threads, 256, 0); }},
-    {"--frames", "N", "draw N times and tell the median time of each pass (1)",
-     [](Options& o, const Value& v) { v.read(o.frames, 9999); }},
+    {"--frames", "N", "draw N times and tell the median time of each pass; or A:B/N, from A up to B of N (1)",
+     [](Options& o, const Value& v) { v.read_frames(o.frames, o.first_frame, o.end_frame); }},
+    {"--move", "WHAT", "a picture for each frame: object (the first one), camera or light goes round up (nothing)",
+     [](Options& o, const Value& v) { o.move = Options::Move(v.one_of({"nothing", "object", "camera", "light"})); }},
     {"--show", "", "print the picture in the terminal, too", [](Options& o, const Value&) { o.show = true; }},
     {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }, "-q"},
     {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }, "-h"},
@@ -348,7 +373,7 @@ static Options parse(int argc, char** argv) {
     for (int i = 1; i < argc && !opt.help && !opt.version; i++) {
         const std::string arg = argv[i];
         if (only_models || arg[0] != '-' || arg == "-") {
-            opt.models.push_back(arg);
+            opt.models.push_back({arg, {}});
             continue;
         }
         if ((only_models = arg == "--")) continue;
@@ -375,7 +400,7 @@ static Options parse(int argc, char** argv) {
         throw UsageError("the light and --center are at the same point");
     if (opt.only == Options::Only::depth && opt.method != Options::Method::map)
         throw UsageError("--only depth: there is no shadow buffer without --shadow map");
-    if (opt.models.empty()) opt.models.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
+    if (opt.models.empty()) opt.models.push_back({UMBRA_OBJ_DIR "/idol/idol.obj", {}});
     return opt;
 }
 
@@ -408,12 +433,25 @@ struct Scene {
 
 static Scene load(const Options& opt) {
     Scene scene;
-    for (const auto& path : opt.models)
-        scene.models.emplace_back(path, opt.tangent ? NormalMap::tangent : NormalMap::object);
+    scene.models.reserve(opt.models.size());
+    for (const Options::Placed& placed : opt.models) {  // each file is read once, wherever and how often it is placed
+        const auto same = [&](const Options::Placed& p) { return p.path == placed.path; };
+        const auto first = std::find_if(opt.models.begin(), opt.models.end(), same) - opt.models.begin();
+        if (first < std::ssize(scene.models)) scene.models.push_back(scene.models[first]);
+        else scene.models.emplace_back(placed.path, opt.tangent ? NormalMap::tangent : NormalMap::object);
+    }
+    for (std::size_t i = 0; i < scene.models.size(); i++) {
+        const Options::Placed& placed = opt.models[i];
+        Model& model = scene.models[i];
+        model.turn = rotation(opt.up, placed.turn);
+        const mat4 M_o = translation(placed.at) * model.turn;
+        if (!(M_o == mat4::identity()) || placed.scale != 1)
+            model.move([&](const vec3& v) { return (M_o * point(v * placed.scale)).xyz(); });
+    }
     return scene;
 }
 
-// What the scene does not need is left out from here on.
+// What a frame does not need is left out.
 static void leave_out(const Options& opt, Scene& scene) {
     scene.seen = seen_by(viewer(opt), scene.models, opt.width, opt.height);
     if (opt.method != Options::Method::off && opt.light == Options::Light::far)
@@ -424,10 +462,15 @@ static void leave_out(const Options& opt, Scene& scene) {
         scene.casters = scene.seen.empty() ? Models() : seen_by(light, scene.models, 1, 1);
     }
     if (opt.only == Options::Only::depth) scene.seen.clear();
+}
+
+static void load_textures(const Options& opt, Scene& scene) {
+    Model::Pictures pictures;
+    const bool all = opt.move != Options::Move::nothing && opt.only != Options::Only::depth;  // may be seen later
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         Model& model = scene.models[i];
-        if (std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures();
-        for (const std::string& what : model.notes()) note(opt, opt.models[i].string() + ": " + what);
+        if (all || std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures(pictures);
+        for (const std::string& what : model.notes()) note(opt, opt.models[i].path.string() + ": " + what);
     }
 }
 
@@ -444,11 +487,12 @@ static void prepare_folder(const Options& opt) {
 }
 
 // Writes both pictures or, where one does not fit on the disk, none. Returns where they are.
-static std::string write(const Options& opt, const Shadow& shadow, const TGAImage& frame) {
-    const std::filesystem::path paths[] = {opt.out / "depth.tga", opt.out / "framebuffer.tga"};
+static std::string write(const Options& opt, const Shadow& shadow, const TGAImage& frame, const std::string& number) {
+    const std::filesystem::path paths[] = {opt.out / ("depth" + number + ".tga"),
+                                           opt.out / ("framebuffer" + number + ".tga")};
     std::optional<TGAFile> files[2];
     parallel_for(2, [&](int i, int) {
-        if (i == 0 && shadow.shadowbuffer.width() && opt.only != Options::Only::framebuffer)
+        if (i == 0 && shadow.method == Options::Method::map && opt.only != Options::Only::framebuffer)
             files[i].emplace(depth_picture(shadow.shadowbuffer, shadow.aspect), paths[i]);
         if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, paths[i]);
     });
@@ -527,6 +571,19 @@ static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+static std::string number(int frame) {
+    char text[8];
+    std::snprintf(text, sizeof text, "_%04d", frame);
+    return text;
+}
+
+// A line that is written over, for who waits at a terminal.
+static void progress([[maybe_unused]] int done, [[maybe_unused]] int all) {
+#ifdef TIOCGWINSZ
+    if (isatty(2)) std::fprintf(stderr, done < all ? "\rframe %d of %d" : "\r\033[K", done, all);
+#endif
+}
+
 static double median(std::vector<double>& values) {
     std::sort(values.begin(), values.end());
     return values[values.size() / 2];
@@ -536,6 +593,7 @@ static void run(Options opt) {
     const double start = milliseconds();
     prepare_folder(opt);
     Scene scene = load(opt);
+    const vec3 low = scene.models[0].low(), side = scene.models[0].high() - low;  // before it is fitted
     // As the default eye sees it, so that a scene does not change its size when the eye moves; but whoever says what is
     // up has another view in mind.
     const bool has_up = !(opt.up == Options().up);
@@ -548,35 +606,60 @@ static void run(Options opt) {
     // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
     if (opt.light != Options::Light::far) opt.light_dir = opt.light_dir - opt.center;
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
+    // Where the first model's own origin has come to: it turns about that.
+    const double size = norm(side), scale = size > 0 ? norm(scene.models[0].high() - scene.models[0].low()) / size : 1;
+    const vec3 axis = scene.models[0].low() + (opt.models[0].at - low) * scale;
     leave_out(opt, scene);
+    load_textures(opt, scene);
     const double loaded = milliseconds();
+    const bool moves = opt.move != Options::Move::nothing;
+    const Options at_rest = opt;
+    const Model object = scene.models[0];
     Shadow shadow;
     TGAImage frame(opt.width, opt.height, TGAImage::RGB);
     Counters c;
-    std::vector<double> depth_ms, shade_ms;
-    for (int i = 0; i < opt.frames; i++) {
+    std::string pictures, first_pictures;
+    std::vector<double> depth_ms, shade_ms, write_ms;
+    int spared = 0;  // passes of the light that would not have changed its buffer
+    for (int i = opt.first_frame; i < opt.end_frame; i++) {
+        const Models casters_before = scene.casters;
+        if (moves) {
+            const mat4 turn = rotation(opt.up, 360. * i / opt.frames);
+            const auto turned = [&](const vec3& v) { return (turn * direction(v)).xyz(); };
+            if (opt.move == Options::Move::camera) opt.eye = turned(at_rest.eye);
+            if (opt.move == Options::Move::light) opt.light_dir = turned(at_rest.light_dir);
+            if (opt.move == Options::Move::object) {
+                scene.models[0] = object;
+                scene.models[0].turn = turn * object.turn;
+                scene.models[0].move([&](const vec3& v) { return turned(v - axis) + axis; });
+            }
+            leave_out(opt, scene);
+        }
         const double began = milliseconds();
-        first_pass(opt, scene.casters, shadow);
+        if (opt.move == Options::Move::camera && i > opt.first_frame && scene.casters == casters_before) spared++;
+        else first_pass(opt, scene.casters, shadow);
         const double first = milliseconds();
         if (opt.only != Options::Only::depth) c = second_pass(opt, scene.seen, shadow, frame);
-        depth_ms.push_back(first - began), shade_ms.push_back(milliseconds() - first);
+        const double drawn = milliseconds();
+        if (moves || i + 1 == opt.end_frame) pictures = write(opt, shadow, frame, moves ? number(i) : "");
+        if (moves && first_pictures.empty()) first_pictures = pictures + " to ";
+        depth_ms.push_back(first - began), shade_ms.push_back(drawn - first);
+        write_ms.push_back(milliseconds() - drawn);
+        if (moves && !opt.quiet) progress(i + 1 - opt.first_frame, opt.end_frame - opt.first_frame);
     }
-    const double drawn = milliseconds();
-    const std::string pictures = write(opt, shadow, frame);
-    const double written = milliseconds();
     const bool only_depth = opt.only == Options::Only::depth;
     const bool is_seen = only_depth ? !scene.casters.empty() : c.shaded > 0;
     if (opt.show && is_seen) only_depth ? show(depth_picture(shadow.shadowbuffer, shadow.aspect)) : show(frame);
     note_darkness(opt, frame, is_seen);
     if (opt.quiet) return;
     const std::string left_out = missing_maps(scene.models) + (scene.casters.empty() ? ",shadow" : "");
-    if (!pictures.empty()) std::printf("wrote %s\n", pictures.c_str());
+    if (!pictures.empty()) std::printf("wrote %s\n", (first_pictures + pictures).c_str());
     std::printf("triangles %ld pixels %ld fragments %ld load_ms %.3f depth_ms %.3f shade_ms %.3f write_ms %.3f "
                 "shadow_bytes %zu outside %ld between_samples %ld hidden %ld models %zu seen %zu casters %zu "
-                "left_out %s\n",
-                c.triangles, c.shaded, c.shaded, loaded - start, median(depth_ms), median(shade_ms), written - drawn,
+                "spared %d left_out %s\n",
+                c.triangles, c.shaded, c.shaded, loaded - start, median(depth_ms), median(shade_ms), write_ms.back(),
                 shadow.shadowbuffer.bytes() + shadow.grid.bytes(), c.outside, c.between_samples, c.covered - c.shaded,
-                scene.models.size(), scene.seen.size(), scene.casters.size(),
+                scene.models.size(), scene.seen.size(), scene.casters.size(), spared,
                 left_out.empty() ? "-" : left_out.c_str() + 1);
 }
 

@@ -724,14 +724,14 @@ Model::Model(const fs::path& path, NormalMap wanted) {
 }
 
 // As many at a time as there are cores. What is thrown is the error of the first bad one in the order of their paths.
-void Model::load_textures() {
+void Model::load_textures(Pictures& loaded) {
     std::deque<std::future<TGAImage>> started;
     auto next = textures_.begin();
     for (const auto& [path, uses] : textures_) {
         for (; next != textures_.end() && started.size() < std::max(1u, std::thread::hardware_concurrency()); next++)
-            started.push_back(std::async(TGAImage::read_tga_file, next->first));
-        const auto picture = std::make_shared<const TGAImage>(started.front().get());
-        started.pop_front();
+            if (!loaded[next->first]) started.push_back(std::async(TGAImage::read_tga_file, next->first));
+        auto& picture = loaded[path];
+        if (!picture) picture = std::make_shared<const TGAImage>(started.front().get()), started.pop_front();
         for (const auto& [material, map] : uses)
             if ((map == &Material::normal || map == &Material::tangent) && picture->is_grey())
                 add(notes_, "a grey picture, heights and no normals, left out", fs::path(path).filename().string());

@@ -62,8 +62,14 @@ public:
     // it may be mapped. Concave polygons with more than 1000 corners stay fans, with a note.
     explicit Model(const std::filesystem::path& obj, NormalMap wanted = NormalMap::object);
 
-    // Decodes the textures, each once: for models that are seen. Throws what TGAImage::read_tga_file throws.
-    void load_textures();
+    // Decodes the textures that are not LOADED yet, each once: for models that are seen. Throws what
+    // TGAImage::read_tga_file throws.
+    using Pictures = std::map<std::string, std::shared_ptr<const TGAImage>>;  // by path
+    void load_textures(Pictures& loaded);
+    void load_textures() {
+        Pictures none;
+        load_textures(none);
+    }
 
     // Made in memory: three corners a face. It has one material, without maps.
     Model(std::vector<vec3> verts, std::vector<vec2> uvs, std::vector<vec3> normals, std::vector<Corner> corners)
@@ -103,6 +109,9 @@ public:
     // The box of all vertices: a vertex that no face uses has been put where another is.
     const vec3& low() const { return low_; }
     const vec3& high() const { return high_; }
+
+    // What has turned the vertices, and turns the normals, too: those above and those of a map are as in the file.
+    mat4 turn = mat4::identity();
 
     // Puts each vertex v where to(v) says.
     template <class F>

@@ -30,6 +30,19 @@ mat4 lookat(const vec3& eye, const vec3& center, const vec3& up) {
 
 mat4 projection(double c) { return {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, c, 1}}}; }
 
+mat4 rotation(const vec3& axis, double degrees) {  // O. Rodrigues, 1840
+    const vec3 k = axis == vec3{} ? vec3{0, 1, 0} : normalized(axis);
+    const double angle = std::fmod(degrees, 360) * std::numbers::pi / 180, c = std::cos(angle), s = std::sin(angle);
+    mat4 m = mat4::identity();
+    for (int j = 0; j < 3; j++) {
+        vec3 e;
+        e[j] = 1;
+        const vec3 turned = e * c + cross(k, e) * s + k * (k[j] * (1 - c));
+        for (int i = 0; i < 3; i++) m[i][j] = turned[i];
+    }
+    return m;
+}
+
 mat4 beam(double distance, double half_angle) {
     const double reach = distance * std::tan(half_angle * std::numbers::pi / 180);  // in the plane of the center
     mat4 m = projection(-1 / distance);

@@ -35,6 +35,9 @@ mat4 beam(double distance, double half_angle);
 
 mat4 translation(const vec3& by);
 
+// Counterclockwise about the axis as it points at the viewer; about +y where it has no direction.
+mat4 rotation(const vec3& axis, double degrees);
+
 // Takes [-1,1]^3 to [x,x+w] x [y,y+h] x [0,screen_depth]; x, y, w, h in pixels.
 mat4 viewport(double x, double y, double w, double h);
 

@@ -1,6 +1,8 @@
 // cli_test.cpp: the program as its user meets it: options, statuses, error lines, and what happens to earlier pictures.
 #include "run.h"
+#include "scenes.h"
 
+#include <functional>
 #include <map>
 #include <regex>
 #include <set>
@@ -150,6 +152,68 @@ TEST("one line says that a scene was fitted and how it is lit, none with --no-fi
     CHECK(kept.status == 0 && kept.err.empty() && kept.frame != fitted.frame);
     const Outcome quiet = f.run(small + "--quiet big.obj");
     CHECK(quiet.err.empty() && quiet.out.empty() && quiet.frame == fitted.frame);
+}
+
+TEST("--at, --turn and --scale place the model before them; a file is read once, however often it is placed") {
+    const Folder f;
+    const auto prism = [](const std::function<vec3(vec3)>& to) {
+        Obj obj;
+        for (const auto& side : box_sides({-.5, -.4, -.25}, {.5, .4, .25})) {
+            std::vector<vec3> corners;
+            for (const vec3& v : side) corners.push_back(to(v));
+            obj.polygon(corners);
+        }
+        return obj.text();
+    };
+    const auto turned = [](const vec3& v) { return vec3{-v.z, v.y, v.x} * .5 + vec3{.3, .2, -.1}; };
+    f.write("box.obj", prism([](const vec3& v) { return v; }));
+    f.write("placed.obj", prism(turned));
+    const std::string view = "--no-fit --quiet --size 64 --shadow-size 99 ";
+    const std::string place = " --at .3,.2,-.1 --scale .5 --turn -90";
+    CHECK(f.run(view + "box.obj" + place).same_pictures(f.run(view + "placed.obj")));
+    CHECK(f.run(view + "box.obj box.obj" + place).same_pictures(f.run(view + "box.obj placed.obj")));
+    CHECK(!f.run(view + "box.obj box.obj" + place).same_pictures(f.run(view + "box.obj")));
+    CHECK(f.run(view + "--up 0,-2,0 box.obj --turn 90").same_pictures(f.run(view + "--up 0,-1,0 box.obj --turn -270")));
+    const Outcome twice = f.run(view + "- -" + place + " <box.obj");  // standard input can be read only once
+    CHECK(twice.status == 0 && twice.same_pictures(f.run(view + "box.obj placed.obj")));
+    for (const std::string wrong : {"--at 1,2,3 box.obj", "box.obj --turn x", "box.obj --scale 0", "box.obj --at 1"})
+        check_refused(f, wrong, 2, "--");
+}
+
+TEST("a sequence: a frame has the same bytes whichever call draws it; the light's pass is spared where the camera moves") {
+    const Folder f;
+    f.write("yard.obj", yard());
+    f.write("box.obj", "v -.2 0 0\nv .2 0 0\nv 0 .6 .3\nf 1 2 3\n");
+    const std::string view = "--no-fit --size 48x40 --shadow-size 60 --light 1,2,1 ";
+    const std::string scene = " yard.obj --at .1,0,0 box.obj";
+    const auto frame = [&](const std::string& folder, const std::string& number) {
+        const std::string picture = f.read(folder + "/framebuffer" + number);
+        const std::string depth = f.read(folder + "/depth" + number);
+        CHECK(!picture.empty() && !depth.empty());
+        return picture + depth;
+    };
+    for (const std::string move : {"object", "camera", "light"}) {
+        const Outcome all = f.run(view + "-o all --frames 8 --move " + move + scene);
+        CHECK(all.status == 0 && all.err.empty());
+        CHECK_EQ(value(all.out, "spared"), move == "camera" ? 7 : 0);
+        CHECK(all.out.starts_with("wrote all/framebuffer_0000.tga and all/depth_0000.tga to all/framebuffer_0007.tga"));
+        // Three calls side by side, as make, xargs or a job array would start them.
+        const std::string parts = "printf '0:3/8 3:4/8 4:8/8' | xargs -n 1 -P 3 " + umbra_command + " -q " + view +
+                                  "-o parts --move " + move + scene + " --frames";
+        CHECK_EQ(f.run_command("cd \"" + f.path().string() + "\" && " + parts).status, 0);
+        for (int i = 0; i < 8; i++) {
+            const std::string number = "_000" + std::to_string(i) + ".tga";
+            CHECK(frame("all", number) == frame("parts", number));
+            CHECK_EQ(frame("all", number) == frame("all", "_0000.tga"), i == 0);
+        }
+        f.run(view + "-o still" + scene);
+        CHECK(frame("still", ".tga") == frame("all", "_0000.tga"));
+    }
+    const Outcome quarter = f.run(view + "--light 2,2,1 --eye 4,1,-1" + scene);  // (1,1,4) turned by 90 degrees
+    f.run(view + "--light 2,2,1 -o all --frames 4 --move camera" + scene);
+    CHECK(quarter.frame == f.read("all/framebuffer_0001.tga"));
+    for (const std::string wrong : {"3:3/8", "3:9/8", "-1:2/8", "0:2/10000", "0:2", "2/8", "0", "1:2/8x"})
+        check_refused(f, "--frames " + wrong + " yard.obj", 2, "--frames");
 }
 
 TEST("what is not needed is left out, and said") {

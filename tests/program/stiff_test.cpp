@@ -142,6 +142,8 @@ TEST("lights: spot and point at forty places") {
     }
     the_yard.check_exact({"--spot 1,2,1", "--point 1,2,1", "--spot 1,2,1 --beam square",
                           "--light 1,1,1 --spot 1,2,1,60"}, 300);
+    for (const std::string& light : each("--% 1,2,1 ", {"light", "spot", "point"}))  // a second yard in the first
+        the_yard.check_exact(each(light + "m.obj --at .5,%,.3 --turn 30 --scale .3", {"0", "-.35", "1e3"}), 300);
     for (const double n : {1., .1, .01, .001}) {  // a plane that is low under the light has no acne
         const Scene plane(net({0, 1, 0}, {}, 8), "--no-fit");
         plane.check_lit("--point 0," + std::to_string(n) + ",0,89 --eye 0,4,1", 800);

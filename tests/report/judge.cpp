@@ -20,8 +20,9 @@ static std::string copy_of(const Model& model, const Model& fitted, const LightS
         const vec3 a = fitted.vert(face, 0), own = cross(fitted.vert(face, 1) - a, fitted.vert(face, 2) - a);
         for (int c = 0; c < 3; c++) {
             const bool is_far = light.kind == LightSource::far_off;
-            const vec3 n = normalized(is_far ? light.at
+            vec3 n = normalized(is_far ? light.at
                                              : normalized(light.at - fitted.vert(face, c)) + normalized(own));
+            n = (transpose(fitted.turn) * direction(n)).xyz();  // the program will turn it
             faces += "vn " + number(n.x) + ' ' + number(n.y) + ' ' + number(n.z) + '\n';
             corners += ' ' + std::to_string(copy.vertex(model.vert(face, c))) + "//-" + std::to_string(3 - c);
         }
@@ -39,7 +40,14 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
         values[option];
     bool fits = true;
     std::string lamp;  // the last of three options that say which
+    std::vector<Strings> places;  // the options that follow a model
     for (auto arg = arguments.begin(); arg != arguments.end(); ++arg) {
+        if (*arg == "--at" || *arg == "--turn" || *arg == "--scale") {
+            places.resize(paths.size());
+            places.back().push_back(*arg);
+            places.back().push_back(*++arg);
+            continue;
+        }
         const auto option = values.find(*arg);
         const bool is_path = option == values.end() && (arg->size() < 2 || arg->front() != '-');
         (is_path ? paths : towards_light).push_back(*arg);
@@ -60,6 +68,19 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     if (paths.empty()) paths.push_back(UMBRA_OBJ_DIR "/idol/idol.obj");
     for (const std::string& path : paths) models.emplace_back(path);
     const std::vector<Model> as_loaded = models;
+    places.resize(paths.size());
+    for (std::size_t i = 0; i < models.size(); i++) {
+        vec3 at;
+        double turned = 0, scale = 1;
+        for (std::size_t k = 0; k < places[i].size(); k += 2) {
+            const char* const text = places[i][k + 1].c_str();
+            if (places[i][k] == "--at") std::sscanf(text, "%lf,%lf,%lf", &at.x, &at.y, &at.z);
+            else std::sscanf(text, "%lf", places[i][k] == "--turn" ? &turned : &scale);
+        }
+        models[i].turn = rotation(view.up, turned);
+        const mat4 place = translation(at) * models[i].turn;
+        models[i].move([&](const vec3& v) { return (place * point(v * scale)).xyz(); });
+    }
     const View usual;
     const bool has_up = !(view.up == usual.up);
     if (fits && fit(models, has_up ? view.eye - view.center : usual.eye, view.up) && lamp.empty())
@@ -67,6 +88,7 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     for (std::size_t i = 0; i < models.size(); i++) {
         const std::string name = "copy" + std::to_string(i) + ".obj";
         towards_light.push_back(folder.write(name, copy_of(as_loaded[i], models[i], light)));
+        towards_light.insert(towards_light.end(), places[i].begin(), places[i].end());
         models[i].move([&](const vec3& v) { return v - view.center; });
     }
     if (light.kind != LightSource::far_off) light.at = light.at - view.center;
