@@ -180,7 +180,7 @@ TEST("--at, --turn and --scale place the model before them; a file is read once,
         check_refused(f, wrong, 2, "--");
 }
 
-TEST("a sequence: a frame has the same bytes whichever call draws it; the light's pass is spared where the camera moves") {
+TEST("a sequence: a frame has the same bytes whoever draws it; where the camera moves the light's pass is spared") {
     const Folder f;
     f.write("yard.obj", yard());
     f.write("box.obj", "v -.2 0 0\nv .2 0 0\nv 0 .6 .3\nf 1 2 3\n");
