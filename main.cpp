@@ -36,6 +36,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
         double turn = 0, scale = 1;  // about up, in degrees
     };
     std::vector<Placed> models;
+    std::filesystem::path sky;
     std::filesystem::path out = ".";
     enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
     bool own_light = false, tangent = false, fit = true, show = false, quiet = false, help = false, version = false;
@@ -194,6 +195,33 @@ struct PhongShader final : IShader {
     }
 };
 
+// The sky: behind everything and infinitely far off. No light falls on it, and it throws no shadow.
+struct SkyShader final : IShader {
+    mat4 uniform_PM;           // Projection*ModelView, so scaled that w does not vanish for an eye far off
+    const Material* material;
+    vec2 varying_uv[3];
+
+    SkyShader(const Model& m, const Camera& camera) : IShader(m), uniform_PM(camera.to_clip()) {
+        for (int i = 0; i < 4; i++) uniform_PM[i] = uniform_PM[i] / -camera.Projection[3].z;
+    }
+
+    vec4 vertex(int vert) const override {
+        vec4 p = uniform_PM * direction(normalized(model.vert(vert)));  // where the eye is does not count
+        p.z = -1e20 * p.w;
+        return p;
+    }
+    void varying(int iface, int nthvert) override {
+        material = &model.material(iface);
+        varying_uv[nthvert] = model.uv(iface, nthvert);
+    }
+    Color fragment(const Fragment& f) const override {
+        const vec3 Kd = material->Kd;
+        const Color texel = material->diffuse ? Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr()
+                                              : Color{255, 255, 255};
+        return {texel.x * Kd.z, texel.y * Kd.y, texel.z * Kd.x};
+    }
+};
+
 // ---- the two passes ----
 
 static Camera viewer(const Options& opt) {
@@ -226,11 +254,14 @@ static void first_pass(const Options& opt, const Models& casters, Shadow& shadow
 }
 
 // Rendering the frame buffer: the camera stands at the viewer, and each fragment asks whether the light sees it too.
-static Counters second_pass(const Options& opt, const Models& seen, const Shadow& shadow, TGAImage& frame) {
+static Counters second_pass(const Options& opt, const Models& seen, const Models& sky, const Shadow& shadow,
+                            TGAImage& frame) {
     const Camera camera = viewer(opt);
+    std::vector<SkyShader> sky_shaders;
+    for (const Model* model : sky) sky_shaders.emplace_back(*model, camera);
     std::vector<PhongShader> shaders;
     for (const Model* model : seen) shaders.emplace_back(opt, shadow, camera, *model);
-    return draw(shaders, camera.Viewport, frame);
+    return draw(shaders, sky_shaders, camera.Viewport, frame);
 }
 
 // ==== the program around the lesson: the command line and the files ====
@@ -335,6 +366,8 @@ static const Option options[] = {
      [](Options& o, const Value& v) { v.read(v.last_model(o).turn); }},
     {"--scale", "F", "how much larger the model before it is made (1)",
      [](Options& o, const Value& v) { v.read_factor(v.last_model(o).scale); }},
+    {"--sky", "FILE", "a dome that is drawn behind everything, unlit: obj/sky/sky.obj, or another (none)",
+     [](Options& o, const Value& v) { o.sky = v.text; }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
      [](Options& o, const Value& v) { v.read_light(o, Options::Light::far, 0); }},
     {"--spot", "X,Y,Z[,DEG]", "a spot light's place and the half angle of its beam, which goes to the center (25)",
@@ -426,19 +459,24 @@ static void note(const Options& opt, const std::string& what) {
 }
 
 struct Scene {
-    std::vector<Model> models;
+    std::vector<Model> models, skies;  // one or none
+    Models sky;                        // if it is to be seen
     Models seen;     // by the viewer: only these are shaded, and have textures
     Models casters;  // may throw a shadow onto what is seen
 };
 
 static Scene load(const Options& opt) {
     Scene scene;
-    scene.models.reserve(opt.models.size());
     for (const Options::Placed& placed : opt.models) {  // each file is read once, wherever and how often it is placed
         const auto same = [&](const Options::Placed& p) { return p.path == placed.path; };
         const auto first = std::find_if(opt.models.begin(), opt.models.end(), same) - opt.models.begin();
         if (first < std::ssize(scene.models)) scene.models.push_back(scene.models[first]);
         else scene.models.emplace_back(placed.path, opt.tangent ? NormalMap::tangent : NormalMap::object);
+    }
+    if (!opt.sky.empty() && opt.draw == Options::Draw::color && opt.only != Options::Only::depth) {
+        scene.skies.emplace_back(opt.sky).load_textures();
+        scene.sky = scene.skies;
+        for (const std::string& what : scene.skies[0].notes()) note(opt, opt.sky.string() + ": " + what);
     }
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         const Options::Placed& placed = opt.models[i];
@@ -572,7 +610,7 @@ static double milliseconds() {
 }
 
 static std::string number(int frame) {
-    char text[8];
+    char text[16];
     std::snprintf(text, sizeof text, "_%04d", frame);
     return text;
 }
@@ -639,7 +677,7 @@ static void run(Options opt) {
         if (opt.move == Options::Move::camera && i > opt.first_frame && scene.casters == casters_before) spared++;
         else first_pass(opt, scene.casters, shadow);
         const double first = milliseconds();
-        if (opt.only != Options::Only::depth) c = second_pass(opt, scene.seen, shadow, frame);
+        if (opt.only != Options::Only::depth) c = second_pass(opt, scene.seen, scene.sky, shadow, frame);
         const double drawn = milliseconds();
         if (moves || i + 1 == opt.end_frame) pictures = write(opt, shadow, frame, moves ? number(i) : "");
         if (moves && first_pictures.empty()) first_pictures = pictures + " to ";

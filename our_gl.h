@@ -245,6 +245,19 @@ Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& 
     return draw(shader, static_cast<int>(shaders.size()), Viewport, target);
 }
 
+template <class Shader, class Other, class Target>
+Counters draw(const std::vector<Shader>& shaders, const std::vector<Other>& others, const mat4& Viewport,
+              Target& target) {
+    const int n = static_cast<int>(shaders.size());
+    std::vector<std::vector<Shader>> own(thread_count(), shaders);
+    std::vector<std::vector<Other>> other(thread_count(), others);
+    const auto shader = [&](int i, int thread) -> IShader& {
+        if (i < n) return own[thread][i];
+        return other[thread][i - n];
+    };
+    return draw(shader, n + static_cast<int>(others.size()), Viewport, target);
+}
+
 // ---- shadows ----
 
 // How far a texel of the shadow buffer may stand above a fragment without shadowing it, in units of depth: what the

@@ -66,6 +66,7 @@ int main(int argc, char** argv) try {
     check_closed(tube.mesh, "knot", 0);
     write(argv[1], "idol", "The idol: a horned bust", idol, bake_idol(idol, 1024));
     write(argv[1], "floor", "The floor: a slab of flagstones", slab, bake_floor(512));
+    write(argv[1], "sky", "The sky: a dome above the clouds", sky_dome(), bake_sky(1024, 512));
     write(argv[1], "knot", "The knot: a tube along the torus knot (2,3)", tube, {});
 } catch (const std::exception& error) {
     std::fprintf(stderr, "make_models: %s\n", error.what());

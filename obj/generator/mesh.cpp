@@ -1,7 +1,9 @@
 // mesh.cpp: the idol's distance function turned into triangles, and these into fewer.
 #include "mesh.h"
 
+#include <limits>
 #include <map>
+#include <optional>
 #include <queue>
 #include <set>
 #include <stdexcept>
@@ -61,6 +63,48 @@ void settle(Mesh& m) {
         }
         if (!fine) m.verts[v] = before;
     }
+}
+
+// Gauss-Jordan elimination with full pivoting, after rows and columns have been scaled by powers of two to a largest
+// element in [1,2). It is as careful as the renderer's needs not be, and the committed idol hangs on its last bits.
+std::optional<mat3> inverse_of(mat3 a) {
+    int row_exponent[3], column_exponent[3], column_of[3];
+    const auto exponent = [](const vec3& v) {
+        const double largest = std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+        return largest > 0 ? std::ilogb(largest) : 0;
+    };
+    for (int i = 0; i < 3; i++) {
+        row_exponent[i] = exponent(a[i]);
+        for (int j = 0; j < 3; j++) a[i][j] = std::scalbn(a[i][j], -row_exponent[i]);
+    }
+    for (int j = 0; j < 3; j++) {
+        column_exponent[j] = exponent(a.col(j));
+        for (int i = 0; i < 3; i++) a[i][j] = std::scalbn(a[i][j], -column_exponent[j]);
+    }
+    mat3 inverse = mat3::identity(), out;
+    bool used[3] = {};
+    for (int k = 0; k < 3; k++) {
+        int row = k, column = 0;
+        double best = -1;
+        for (int i = k; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                if (!used[j] && std::fabs(a[i][j]) > best) best = std::fabs(a[i][j]), row = i, column = j;
+        if (!(best > 6 * std::numeric_limits<double>::epsilon())) return {};
+        std::swap(a[k], a[row]);
+        std::swap(inverse[k], inverse[row]);
+        used[column] = true, column_of[k] = column;
+        const double pivot = a[k][column];
+        a[k] = a[k] / pivot, inverse[k] = inverse[k] / pivot;
+        for (int i = 0; i < 3; i++) {
+            if (i == k) continue;
+            const double factor = a[i][column];
+            a[i] = a[i] - a[k] * factor, inverse[i] = inverse[i] - inverse[k] * factor;
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        for (int j = 0; j < 3; j++)
+            out[column_of[k]][j] = std::scalbn(inverse[k][j], -column_exponent[column_of[k]] - row_exponent[j]);
+    return out;
 }
 
 struct Quadric {  // x'Ax + 2b'x + c: a weighted sum of squared distances to planes
@@ -212,7 +256,7 @@ Mesh simplify(Mesh m, int target) {
         q.add(quadric[b]);
         const vec3 middle = (m.verts[a] + m.verts[b]) / 2;
         vec3 p = middle;
-        if (const auto inverse = invert(q.A)) p = *inverse * (-q.b);
+        if (const auto inverse = inverse_of(q.A)) p = *inverse * (-q.b);
         if (norm(p - middle) > norm(m.verts[a] - m.verts[b])) p = middle;
         heap.push({std::max(0., q.error(p)), a, b, stamp[a], stamp[b], p});
     };

@@ -30,6 +30,8 @@ Maps bake_idol(const Textured& t, int size);
 Textured floor_slab();
 Maps bake_floor(int size);
 Textured knot();
+Textured sky_dome();
+Maps bake_sky(int width, int height);
 
 // Twice the area from a to b, counter-clockwise.
 inline double cross(const vec2& a, const vec2& b) { return a.x * b.y - a.y * b.x; }

@@ -487,6 +487,13 @@ TEST("default render") {
     check(TGAImage::read_tga_file(idol / "depth.tga"), "depth");
 }
 
+TEST("idol, floor and sky, under a spot light") {
+    const Scene idol([](Scene&) {});
+    const std::string obj = UMBRA_OBJ_DIR;
+    check(idol.draw("--no-fit --size 400 --spot 2,3,2.5,16 --sky " + obj + "/sky/sky.obj " + obj + "/idol/idol.obj " +
+                    obj + "/floor/floor.obj"), "spot_under_sky");
+}
+
 TEST("a wrong bias or camera is another picture") {
     const Scene yard(add_yard);
     const TGAImage reference = TGAImage::read_tga_file(fs::path(UMBRA_REFERENCE_DIR) / "no_textures.tga");

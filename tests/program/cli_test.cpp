@@ -216,6 +216,30 @@ TEST("a sequence: a frame has the same bytes whoever draws it; where the camera 
         check_refused(f, "--frames " + wrong + " yard.obj", 2, "--frames");
 }
 
+TEST("a sky is behind everything, wherever the eye is, and changes nothing else") {
+    const Folder f;
+    f.write("yard.obj", yard());
+    Obj sky;
+    for (const auto& side : box_sides({.01, .01, .01}, {-.01, -.01, -.01}))
+        sky.polygon({side[0], side[1], side[2], side[3]});
+    f.write("sky.obj", "mtllib sky.mtl\nusemtl s\n" + sky.text());
+    f.write("sky.mtl", "newmtl s\nKd .2 .4 .6\n");
+    for (const std::string options : {"", "--eye 0,0,1e9 ", "--eye .1,.1,.2 ", "--up 0,0,1 --zoom .3 "}) {
+        const std::string view = "--no-fit -q --size 40 --shadow-size 50 " + options;
+        const Outcome without = f.run(view + "yard.obj");
+        std::vector<Bytes> pixels;
+        f.each_pixel([&](int, int, const std::uint8_t* bgr) { pixels.emplace_back(bgr, bgr + 3); });
+        CHECK(f.run(view + "--sky sky.obj yard.obj").depth == without.depth);
+        f.each_pixel([&](int x, int y, const std::uint8_t* bgr) {
+            const Bytes& before = pixels[y * 40 + x];
+            CHECK(Bytes(bgr, bgr + 3) == (before == Bytes(3) ? Bytes{153, 102, 51} : before));
+        });
+        for (const std::string other : {"--draw shadow", "--draw normal", "--only depth"})
+            CHECK(f.run(view + other + " --sky sky.obj yard.obj").same_pictures(f.run(view + other + " yard.obj")));
+    }
+    check_refused(f, "--sky none.obj yard.obj", 1, "none.obj: cannot be opened");
+}
+
 TEST("what is not needed is left out, and said") {
     const Folder f;
     f.write("plain.obj", triangle);

@@ -35,8 +35,8 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
     for (const char* option : {"-o", "--output", "--size", "--shadow-size", "--eye", "--center", "--up", "--zoom",
-                               "--light", "--spot", "--point", "--beam", "--shadow", "--bias", "--draw", "--only",
-                               "--threads", "--frames"})
+                               "--light", "--spot", "--point", "--beam", "--sky", "--shadow", "--bias", "--draw",
+                               "--only", "--threads", "--frames"})
         values[option];
     bool fits = true;
     std::string lamp;  // the last of three options that say which
