@@ -30,19 +30,6 @@ struct Options {  // the lesson's scene; the command line can change each of the
     enum class Method { map, exact, off } method = Method::map;  // of shadows
     std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
-    struct Placed {
-        std::filesystem::path path;
-        vec3 at;
-        double turn = 0, scale = 1;  // about up, in degrees
-    };
-    std::vector<Placed> models;
-    std::filesystem::path sky;
-    std::filesystem::path out = ".";
-    enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
-    bool own_light = false, tangent = false, fit = true, show = false, quiet = false, help = false, version = false;
-    int threads = 0;  // 0: all processors
-    int frames = 1, first_frame = 0, end_frame = 1;
-    enum class Move { nothing, object, camera, light } move = Move::nothing;  // goes round up once in so many frames
 };
 
 // ---- pass 1: what the light sees ----
@@ -215,10 +202,9 @@ struct SkyShader final : IShader {
         varying_uv[nthvert] = model.uv(iface, nthvert);
     }
     Color fragment(const Fragment& f) const override {
-        const vec3 Kd = material->Kd;
-        const Color texel = material->diffuse ? Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr()
-                                              : Color{255, 255, 255};
-        return {texel.x * Kd.z, texel.y * Kd.y, texel.z * Kd.x};
+        const vec3 Kd = material->Kd * 255;
+        return material->diffuse ? Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr()
+                                 : Color{Kd.z, Kd.y, Kd.x};
     }
 };
 
@@ -265,6 +251,22 @@ static Counters second_pass(const Options& opt, const Models& seen, const Models
 }
 
 // ==== the program around the lesson: the command line and the files ====
+
+struct Arguments : Options {  // what else the command line says
+    struct Placed {
+        std::filesystem::path path;
+        vec3 at;
+        double turn = 0, scale = 1;  // about up, in degrees
+    };
+    std::vector<Placed> models;
+    std::filesystem::path sky;
+    std::filesystem::path out = ".";
+    enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
+    bool own_light = false, tangent = false, fit = true, show = false, quiet = false, help = false, version = false;
+    int threads = 0;  // 0: all processors
+    int frames = 1, first_frame = 0, end_frame = 1;
+    enum class Move { nothing, object, camera, light } move = Move::nothing;  // goes round up once in so many frames
+};
 
 struct UsageError : std::runtime_error {  // a wrong command line: status 2
     using std::runtime_error::runtime_error;
@@ -317,11 +319,11 @@ struct Value {
             fail("three numbers X,Y,Z joined by commas, as in 1,1,0");
         if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
     }
-    Options::Placed& last_model(Options& o) const {
+    Arguments::Placed& last_model(Arguments& o) const {
         if (o.models.empty()) throw UsageError(option + ": there is no model before it");
         return o.models.back();
     }
-    void read_light(Options& o, Options::Light kind, double half_angle) const {
+    void read_light(Arguments& o, Options::Light kind, double half_angle) const {
         char rest;
         vec3& v = o.light_dir;
         const int n = std::sscanf(text.c_str(), "%lf,%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &half_angle, &rest);
@@ -343,65 +345,65 @@ struct Value {
 
 struct Option {
     const char *name, *takes, *help;
-    void (*set)(Options&, const Value&);
+    void (*set)(Arguments&, const Value&);
     const char* short_name = "";
 };
 
 static const Option options[] = {
     {"--output", "DIR", "folder of the two pictures, made where it is missing (.)",
-     [](Options& o, const Value& v) { v.read(o.out); }, "-o"},
+     [](Arguments& o, const Value& v) { v.read(o.out); }, "-o"},
     {"--size", "WxH", "the picture's pixels; N is NxN (800x800)",
-     [](Options& o, const Value& v) { v.read_size(o.width, o.height); }},
+     [](Arguments& o, const Value& v) { v.read_size(o.width, o.height); }},
     {"--shadow-size", "N", "the shadow buffer's pixels a side (800)",
-     [](Options& o, const Value& v) { v.read(o.shadow_size, max_size); }},
-    {"--eye", "X,Y,Z", "the viewer (1,1,4)", [](Options& o, const Value& v) { v.read(o.eye); }},
-    {"--center", "X,Y,Z", "what the viewer looks at (0,0,0)", [](Options& o, const Value& v) { v.read(o.center); }},
+     [](Arguments& o, const Value& v) { v.read(o.shadow_size, max_size); }},
+    {"--eye", "X,Y,Z", "the viewer (1,1,4)", [](Arguments& o, const Value& v) { v.read(o.eye); }},
+    {"--center", "X,Y,Z", "what the viewer looks at (0,0,0)", [](Arguments& o, const Value& v) { v.read(o.center); }},
     {"--up", "X,Y,Z", "what appears upwards; 0,0,0: the axis that the view is least along (0,1,0)",
-     [](Options& o, const Value& v) { v.read(o.up); }},
+     [](Arguments& o, const Value& v) { v.read(o.up); }},
     {"--zoom", "F", "magnifies about the middle, which a nearer eye does not (1)",
-     [](Options& o, const Value& v) { v.read_factor(o.zoom); }},
+     [](Arguments& o, const Value& v) { v.read_factor(o.zoom); }},
     {"--at", "X,Y,Z", "where the model before it stands (0,0,0)",
-     [](Options& o, const Value& v) { v.read(v.last_model(o).at); }},
+     [](Arguments& o, const Value& v) { v.read(v.last_model(o).at); }},
     {"--turn", "DEG", "how far the model before it is turned about up (0)",
-     [](Options& o, const Value& v) { v.read(v.last_model(o).turn); }},
+     [](Arguments& o, const Value& v) { v.read(v.last_model(o).turn); }},
     {"--scale", "F", "how much larger the model before it is made (1)",
-     [](Options& o, const Value& v) { v.read_factor(v.last_model(o).scale); }},
+     [](Arguments& o, const Value& v) { v.read_factor(v.last_model(o).scale); }},
     {"--sky", "FILE", "a dome that is drawn behind everything, unlit: obj/sky/sky.obj, or another (none)",
-     [](Options& o, const Value& v) { o.sky = v.text; }},
+     [](Arguments& o, const Value& v) { o.sky = v.text; }},
     {"--light", "X,Y,Z", "direction towards the light (1,1,0; 1,1,1 where a scene is fitted)",
-     [](Options& o, const Value& v) { v.read_light(o, Options::Light::far, 0); }},
+     [](Arguments& o, const Value& v) { v.read_light(o, Options::Light::far, 0); }},
     {"--spot", "X,Y,Z[,DEG]", "a spot light's place and the half angle of its beam, which goes to the center (25)",
-     [](Options& o, const Value& v) { v.read_light(o, Options::Light::spot, 25); }},
+     [](Arguments& o, const Value& v) { v.read_light(o, Options::Light::spot, 25); }},
     {"--point", "X,Y,Z[,DEG]", "a point light's place, and how far around it has shadows, from the center on (80)",
-     [](Options& o, const Value& v) { v.read_light(o, Options::Light::point, 80); }},
+     [](Arguments& o, const Value& v) { v.read_light(o, Options::Light::point, 80); }},
     {"--beam", "SHAPE", "a spot light's: round or square (round)",
-     [](Options& o, const Value& v) { o.square_beam = v.one_of({"round", "square"}) == 1; }},
+     [](Arguments& o, const Value& v) { o.square_beam = v.one_of({"round", "square"}) == 1; }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
-     [](Options& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
+     [](Arguments& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
-     [](Options& o, const Value& v) { v.read(o.bias.emplace()); }},
+     [](Arguments& o, const Value& v) { v.read(o.bias.emplace()); }},
     {"--draw", "WHAT", "color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)",
-     [](Options& o, const Value& v) { o.draw = Options::Draw(v.one_of({"color", "shadow", "normal"})); }},
+     [](Arguments& o, const Value& v) { o.draw = Options::Draw(v.one_of({"color", "shadow", "normal"})); }},
     {"--only", "WHAT", "framebuffer, or depth: one of the two pictures, without what it does not need (both)",
-     [](Options& o, const Value& v) { o.only = Options::Only(v.one_of({"both", "framebuffer", "depth"})); }},
+     [](Arguments& o, const Value& v) { o.only = Arguments::Only(v.one_of({"both", "framebuffer", "depth"})); }},
     {"--tangent", "", "prefer a tangent-space normal map to an object-space one",
-     [](Options& o, const Value&) { o.tangent = true; }},
+     [](Arguments& o, const Value&) { o.tangent = true; }},
     {"--no-fit", "", "keep the scene's own coordinates (default: fit it where it is cut off, off the centre or small)",
-     [](Options& o, const Value&) { o.fit = false; }},
+     [](Arguments& o, const Value&) { o.fit = false; }},
     {"--threads", "N", "the pictures are the same at any number (0, all processors)",
-     [](Options& o, const Value& v) { v.read(o.threads, 256, 0); }},
+     [](Arguments& o, const Value& v) { v.read(o.threads, 256, 0); }},
     {"--frames", "N", "draw N times and tell the median time of each pass; or A:B/N, from A up to B of N (1)",
-     [](Options& o, const Value& v) { v.read_frames(o.frames, o.first_frame, o.end_frame); }},
+     [](Arguments& o, const Value& v) { v.read_frames(o.frames, o.first_frame, o.end_frame); }},
     {"--move", "WHAT", "a picture for each frame: object (the first one), camera or light goes round up (nothing)",
-     [](Options& o, const Value& v) { o.move = Options::Move(v.one_of({"nothing", "object", "camera", "light"})); }},
-    {"--show", "", "print the picture in the terminal, too", [](Options& o, const Value&) { o.show = true; }},
-    {"--quiet", "", "print errors only", [](Options& o, const Value&) { o.quiet = true; }, "-q"},
-    {"--help", "", "print this", [](Options& o, const Value&) { o.help = true; }, "-h"},
-    {"--version", "", "print the version", [](Options& o, const Value&) { o.version = true; }, "-V"},
+     [](Arguments& o, const Value& v) { o.move = Arguments::Move(v.one_of({"nothing", "object", "camera", "light"})); }},
+    {"--show", "", "print the picture in the terminal, too", [](Arguments& o, const Value&) { o.show = true; }},
+    {"--quiet", "", "print errors only", [](Arguments& o, const Value&) { o.quiet = true; }, "-q"},
+    {"--help", "", "print this", [](Arguments& o, const Value&) { o.help = true; }, "-h"},
+    {"--version", "", "print the version", [](Arguments& o, const Value&) { o.version = true; }, "-V"},
 };
 
-static Options parse(int argc, char** argv) {
-    Options opt;
+static Arguments parse(int argc, char** argv) {
+    Arguments opt;
     bool only_models = false;  // after --
     for (int i = 1; i < argc && !opt.help && !opt.version; i++) {
         const std::string arg = argv[i];
@@ -431,7 +433,7 @@ static Options parse(int argc, char** argv) {
     if (is_far && opt.light_dir == vec3{}) throw UsageError("--light has no direction");
     if (!is_far && !std::isfinite(1 / norm(opt.light_dir - opt.center)))
         throw UsageError("the light and --center are at the same point");
-    if (opt.only == Options::Only::depth && opt.method != Options::Method::map)
+    if (opt.only == Arguments::Only::depth && opt.method != Options::Method::map)
         throw UsageError("--only depth: there is no shadow buffer without --shadow map");
     if (opt.models.empty()) opt.models.push_back({UMBRA_OBJ_DIR "/idol/idol.obj", {}});
     return opt;
@@ -454,7 +456,7 @@ static int complain(std::string what, int status) {
     return status;
 }
 
-static void note(const Options& opt, const std::string& what) {
+static void note(const Arguments& opt, const std::string& what) {
     if (!opt.quiet) complain(what, 0);
 }
 
@@ -465,21 +467,21 @@ struct Scene {
     Models casters;  // may throw a shadow onto what is seen
 };
 
-static Scene load(const Options& opt) {
+static Scene load(const Arguments& opt) {
     Scene scene;
-    for (const Options::Placed& placed : opt.models) {  // each file is read once, wherever and how often it is placed
-        const auto same = [&](const Options::Placed& p) { return p.path == placed.path; };
+    for (const Arguments::Placed& placed : opt.models) {  // each file is read once, wherever and how often it is placed
+        const auto same = [&](const Arguments::Placed& p) { return p.path == placed.path; };
         const auto first = std::find_if(opt.models.begin(), opt.models.end(), same) - opt.models.begin();
         if (first < std::ssize(scene.models)) scene.models.push_back(scene.models[first]);
         else scene.models.emplace_back(placed.path, opt.tangent ? NormalMap::tangent : NormalMap::object);
     }
-    if (!opt.sky.empty() && opt.draw == Options::Draw::color && opt.only != Options::Only::depth) {
+    if (!opt.sky.empty() && opt.draw == Options::Draw::color && opt.only != Arguments::Only::depth) {
         scene.skies.emplace_back(opt.sky).load_textures();
         scene.sky = scene.skies;
         for (const std::string& what : scene.skies[0].notes()) note(opt, opt.sky.string() + ": " + what);
     }
     for (std::size_t i = 0; i < scene.models.size(); i++) {
-        const Options::Placed& placed = opt.models[i];
+        const Arguments::Placed& placed = opt.models[i];
         Model& model = scene.models[i];
         model.turn = rotation(opt.up, placed.turn);
         const mat4 M_o = translation(placed.at) * model.turn;
@@ -490,7 +492,7 @@ static Scene load(const Options& opt) {
 }
 
 // What a frame does not need is left out.
-static void leave_out(const Options& opt, Scene& scene) {
+static void leave_out(const Arguments& opt, Scene& scene) {
     scene.seen = seen_by(viewer(opt), scene.models, opt.width, opt.height);
     if (opt.method != Options::Method::off && opt.light == Options::Light::far)
         scene.casters = casters(scene.models, scene.seen, lookat(opt.light_dir, opt.center, opt.up));
@@ -499,12 +501,12 @@ static void leave_out(const Options& opt, Scene& scene) {
         light.Viewport = viewport(0, 0, 1, 1);
         scene.casters = scene.seen.empty() ? Models() : seen_by(light, scene.models, 1, 1);
     }
-    if (opt.only == Options::Only::depth) scene.seen.clear();
+    if (opt.only == Arguments::Only::depth) scene.seen.clear();
 }
 
-static void load_textures(const Options& opt, Scene& scene) {
+static void load_textures(const Arguments& opt, Scene& scene) {
     Model::Pictures pictures;
-    const bool all = opt.move != Options::Move::nothing && opt.only != Options::Only::depth;  // may be seen later
+    const bool all = opt.move != Arguments::Move::nothing && opt.only != Arguments::Only::depth;  // may be seen later
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         Model& model = scene.models[i];
         if (all || std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures(pictures);
@@ -513,26 +515,26 @@ static void load_textures(const Options& opt, Scene& scene) {
 }
 
 // Before anything is drawn: makes the folder, and tries whether the pictures can be written there.
-static void prepare_folder(const Options& opt) {
+static void prepare_folder(const Arguments& opt) {
     std::error_code error;
     std::filesystem::create_directories(opt.out, error);
     if (error) throw std::runtime_error(opt.out.string() + ": cannot be made: " + error.message());
     const auto try_file = [&](const char* name) {  // what is written goes again, since nothing commits it
         TGAFile(TGAImage(1, 1, TGAImage::GRAYSCALE), opt.out / name).write();
     };
-    if (opt.method == Options::Method::map && opt.only != Options::Only::framebuffer) try_file("depth.tga");
-    if (opt.only != Options::Only::depth) try_file("framebuffer.tga");
+    if (opt.method == Options::Method::map && opt.only != Arguments::Only::framebuffer) try_file("depth.tga");
+    if (opt.only != Arguments::Only::depth) try_file("framebuffer.tga");
 }
 
 // Writes both pictures or, where one does not fit on the disk, none. Returns where they are.
-static std::string write(const Options& opt, const Shadow& shadow, const TGAImage& frame, const std::string& number) {
+static std::string write(const Arguments& opt, const Shadow& shadow, const TGAImage& frame, const std::string& number) {
     const std::filesystem::path paths[] = {opt.out / ("depth" + number + ".tga"),
                                            opt.out / ("framebuffer" + number + ".tga")};
     std::optional<TGAFile> files[2];
     parallel_for(2, [&](int i, int) {
-        if (i == 0 && shadow.method == Options::Method::map && opt.only != Options::Only::framebuffer)
+        if (i == 0 && shadow.method == Options::Method::map && opt.only != Arguments::Only::framebuffer)
             files[i].emplace(depth_picture(shadow.shadowbuffer, shadow.aspect), paths[i]);
-        if (i == 1 && opt.only != Options::Only::depth) files[i].emplace(frame, paths[i]);
+        if (i == 1 && opt.only != Arguments::Only::depth) files[i].emplace(frame, paths[i]);
     });
     for (auto& file : files)
         if (file) file->write();
@@ -549,10 +551,10 @@ static std::string write(const Options& opt, const Shadow& shadow, const TGAImag
 }
 
 // A black picture, or one without light, leaves its user with a riddle.
-static void note_darkness(const Options& opt, const TGAImage& frame, bool is_seen) {
+static void note_darkness(const Arguments& opt, const TGAImage& frame, bool is_seen) {
     const auto is_dark = [](int channel) { return channel <= 20; };  // the ambient light
     if (!is_seen) note(opt, "nothing of the scene is seen: see --eye, --center and --zoom");
-    else if (opt.draw == Options::Draw::color && opt.only != Options::Only::depth &&
+    else if (opt.draw == Options::Draw::color && opt.only != Arguments::Only::depth &&
              std::all_of(frame.pixel(0, 0), frame.pixel(0, frame.height()), is_dark))
         note(opt, "nothing that is seen is lit: see --light");
 }
@@ -627,7 +629,7 @@ static double median(std::vector<double>& values) {
     return values[values.size() / 2];
 }
 
-static void run(Options opt) {
+static void run(Arguments opt) {
     const double start = milliseconds();
     prepare_folder(opt);
     Scene scene = load(opt);
@@ -650,8 +652,8 @@ static void run(Options opt) {
     leave_out(opt, scene);
     load_textures(opt, scene);
     const double loaded = milliseconds();
-    const bool moves = opt.move != Options::Move::nothing;
-    const Options at_rest = opt;
+    const bool moves = opt.move != Arguments::Move::nothing;
+    const Arguments at_rest = opt;
     const Model object = scene.models[0];
     Shadow shadow;
     TGAImage frame(opt.width, opt.height, TGAImage::RGB);
@@ -664,9 +666,9 @@ static void run(Options opt) {
         if (moves) {
             const mat4 turn = rotation(opt.up, 360. * i / opt.frames);
             const auto turned = [&](const vec3& v) { return (turn * direction(v)).xyz(); };
-            if (opt.move == Options::Move::camera) opt.eye = turned(at_rest.eye);
-            if (opt.move == Options::Move::light) opt.light_dir = turned(at_rest.light_dir);
-            if (opt.move == Options::Move::object) {
+            if (opt.move == Arguments::Move::camera) opt.eye = turned(at_rest.eye);
+            if (opt.move == Arguments::Move::light) opt.light_dir = turned(at_rest.light_dir);
+            if (opt.move == Arguments::Move::object) {
                 scene.models[0] = object;
                 scene.models[0].turn = turn * object.turn;
                 scene.models[0].move([&](const vec3& v) { return turned(v - axis) + axis; });
@@ -674,10 +676,10 @@ static void run(Options opt) {
             leave_out(opt, scene);
         }
         const double began = milliseconds();
-        if (opt.move == Options::Move::camera && i > opt.first_frame && scene.casters == casters_before) spared++;
+        if (opt.move == Arguments::Move::camera && i > opt.first_frame && scene.casters == casters_before) spared++;
         else first_pass(opt, scene.casters, shadow);
         const double first = milliseconds();
-        if (opt.only != Options::Only::depth) c = second_pass(opt, scene.seen, scene.sky, shadow, frame);
+        if (opt.only != Arguments::Only::depth) c = second_pass(opt, scene.seen, scene.sky, shadow, frame);
         const double drawn = milliseconds();
         if (moves || i + 1 == opt.end_frame) pictures = write(opt, shadow, frame, moves ? number(i) : "");
         if (moves && first_pictures.empty()) first_pictures = pictures + " to ";
@@ -685,7 +687,7 @@ static void run(Options opt) {
         write_ms.push_back(milliseconds() - drawn);
         if (moves && !opt.quiet) progress(i + 1 - opt.first_frame, opt.end_frame - opt.first_frame);
     }
-    const bool only_depth = opt.only == Options::Only::depth;
+    const bool only_depth = opt.only == Arguments::Only::depth;
     const bool is_seen = only_depth ? !scene.casters.empty() : c.shaded > 0;
     if (opt.show && is_seen) only_depth ? show(depth_picture(shadow.shadowbuffer, shadow.aspect)) : show(frame);
     note_darkness(opt, frame, is_seen);
@@ -702,7 +704,7 @@ static void run(Options opt) {
 }
 
 int main(int argc, char** argv) try {
-    const Options opt = parse(argc, argv);
+    const Arguments opt = parse(argc, argv);
     if (opt.threads) use_threads(opt.threads);
     if (opt.help) print_help();
     else if (opt.version) std::puts("umbra " UMBRA_VERSION);
