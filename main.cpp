@@ -150,11 +150,11 @@ struct PhongShader final : IShader {
 
     mask in_light(const Fragment& f) const {
         if (shadow.method == Options::Method::off) return true;
-        const vec<4, coord> sb_h = uniform_Mshadow * point(f.screen);
-        const mask is_behind = !(sb_h.w > 0);  // a point light: what its buffer does not see is lit
-        if (shadow.method == Options::Method::exact)
-            return is_behind | !shadow.grid.shadows(project(interpolated(varying_sb, f.bar)), grid_face + f.face);
+        const bool exact = shadow.method == Options::Method::exact;
+        const vec<4, coord> sb_h = exact ? interpolated(varying_sb, f.bar) : uniform_Mshadow * point(f.screen);
         const vec<3, coord> sb_p = project(sb_h);  // the point in the shadow buffer
+        const mask is_behind = !(sb_h.w > 0);      // a point light: what its buffer does not see is lit
+        if (exact) return is_behind | !shadow.grid.shadows(sb_p, grid_face + f.face);
         const coord stored = shadow.shadowbuffer.at(sb_p);
         // With --bias 0 surfaces shadow themselves here and there: z-fighting. The text's cure is --bias 43.34.
         const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, sb_slope);
@@ -395,7 +395,9 @@ static const Option options[] = {
     {"--frames", "N", "draw N times and tell the median time of each pass; or A:B/N, from A up to B of N (1)",
      [](Arguments& o, const Value& v) { v.read_frames(o.frames, o.first_frame, o.end_frame); }},
     {"--move", "WHAT", "a picture for each frame: object (the first one), camera or light goes round up (nothing)",
-     [](Arguments& o, const Value& v) { o.move = Arguments::Move(v.one_of({"nothing", "object", "camera", "light"})); }},
+     [](Arguments& o, const Value& v) {
+         o.move = Arguments::Move(v.one_of({"nothing", "object", "camera", "light"}));
+     }},
     {"--show", "", "print the picture in the terminal, too", [](Arguments& o, const Value&) { o.show = true; }},
     {"--quiet", "", "print errors only", [](Arguments& o, const Value&) { o.quiet = true; }, "-q"},
     {"--help", "", "print this", [](Arguments& o, const Value&) { o.help = true; }, "-h"},

@@ -152,7 +152,8 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     for (const Strings& method : {Strings{"--bias", "43.34"}, {"--shadow", "map"}, {"--shadow", "exact"}})
         family("light over a plane at n.l", method[0] + " " + method[1] + ": falsely dark %", 0,
                {.1, 1e-2, 1e-3, 1e-4, 1e-6}, [&](double n_l) {
-                   const PictureError e = error(umbra, joined(method, {"--light", ".8," + number(n_l) + ",.6", plane}));
+                   const std::string light = ".8," + number(n_l) + ",.6";
+                   const PictureError e = error(umbra, joined(method, {"--no-fit", "--light", light, plane}));
                    return e.percent(e.falsely_dark);
                });
 
@@ -186,15 +187,17 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
     for (const double d : {1e-1, 1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
         const vec3 center{0, -.25, 0};
         wrong_pixels("eye this near to center", 0, {d},
-                     {"--center", triple(center), "--eye", triple(center + vec3{.25, .125, 1} * d)},
+                     {"--no-fit", "--center", triple(center), "--eye", triple(center + vec3{.25, .125, 1} * d)},
                      [](double) { return yard(1); });
     }
     // Coverage is snapped by up to 2^-17 pixel: 120 long edges of 240 pixels sweep over 120 * 240 * 2^-17 = .22 pixels'
     // centres. More than 3 would be a fault (Poisson: one time in 10 000).
-    wrong_pixels("needles: length to width", 3, {1e1, 1e3, 1e5, 1e7, 1e9}, {"--light", ".3,.2,1"}, needles);
-    wrong_pixels("faces a pixel", 0, {.02, 2, 10, 50}, {"--eye", "0,4,.001", "--light", ".3,1,.2"}, [](double faces) {
-        return floor_of(static_cast<int>(std::lround(std::sqrt(faces * 90000 / 2))));  // the floor is 300 x 300 pixels
-    });
+    wrong_pixels("needles: length to width", 3, {1e1, 1e3, 1e5, 1e7, 1e9}, {"--no-fit", "--light", ".3,.2,1"},
+                 needles);
+    wrong_pixels("faces a pixel", 0, {.02, 2, 10, 50}, {"--no-fit", "--eye", "0,4,.001", "--light", ".3,1,.2"},
+                 [](double faces) {  // the floor is 300 x 300 pixels
+                     return floor_of(static_cast<int>(std::lround(std::sqrt(faces * 90000 / 2))));
+                 });
     return rows;
 }
 
