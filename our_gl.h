@@ -273,8 +273,8 @@ vec2 depth_slope(const vec4 (&corner)[3]);
 class LightGrid {
 public:
     LightGrid() = default;
-    // The light's screen is cells x cells large; what of the faces is beyond it throws no shadow. Takes at most 32 bytes
-    // a vertex, 1.1 KB a face and 5 bytes a cell.
+    // The light's screen is cells x cells large; what of the faces is beyond it throws no shadow. Takes at most
+    // 32 bytes a vertex, 1.1 KB a face and 5 bytes a cell.
     LightGrid(const Models& models, const Camera& light, int cells);
 
     // A cell for eight faces: measured up to 2.5 million of them, more take longer to fill than they save.
