@@ -42,8 +42,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         drawing.push_back(words[i]);
         const bool is_option = words[i].starts_with('-') && words[i].size() > 1;
         const bool takes_next = words[i].find('=') == std::string::npos && !flags.contains(words[i]);
+        const bool is_model = (i > 0 && !is_option) || words[i] == "--sky";
         if (is_option && takes_next) drawing.push_back(words[++i]);
-        else if (!is_option && i > 0) drawing.back() = model.path().string();
+        if (is_model) drawing.back() = model.path().string();
+        if (drawing.back().starts_with("--sky=")) drawing.back() = "--sky=" + model.path().string();
+        if (i == 0) drawing.push_back(model.path().string());  // for --at and its like
     }
     for (const char* word : {"--size", "9x7", "--shadow-size", "5", "--frames", "1", "--threads", "2", "--quiet", "-o"})
         drawing.push_back(word);
