@@ -8,13 +8,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
-#if __has_include(<sys/ioctl.h>)
-#include <sys/ioctl.h>
+#if __has_include(<unistd.h>)
 #include <unistd.h>
 #endif
 
@@ -577,38 +575,6 @@ static std::string missing_maps(const std::vector<Model>& models) {
     return names;
 }
 
-// Prints the picture, averaged down to the terminal's width: a character is two pixels, one above the other.
-static void show(const TGAImage& picture) {
-    const char* const wide = std::getenv("COLUMNS");
-    int columns = wide ? std::atoi(wide) : 0;
-#ifdef TIOCGWINSZ
-    if (winsize size{}; ioctl(1, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) columns = size.ws_col;
-#endif
-    const int w = std::min(columns > 0 ? columns : 80, picture.width());
-    const int h = std::max(1, w * picture.height() / picture.width());
-    const auto average = [&](int x, int y) {  // ";RED;GREEN;BLUE" of the pixels that come together there
-        const int left = x * picture.width() / w, right = (x + 1) * picture.width() / w;
-        const int low = y * picture.height() / h, high = (y + 1) * picture.height() / h;
-        std::string text;
-        for (const int c : {2, 1, 0}) {
-            long long sum = 0;
-            for (int i = low; i < high; i++)
-                for (int j = left; j < right; j++) sum += picture.pixel(j, i)[picture.bytespp() == 1 ? 0 : c];
-            text += ';' + std::to_string(sum / ((right - left) * (high - low)));
-        }
-        return text + 'm';
-    };
-    for (int y = h - 1; y >= 0; y -= 2) {
-        std::string line;
-        for (int x = 0; x < w; x++) {
-            line += "\033[38;2" + average(x, y);
-            if (y > 0) line += "\033[48;2" + average(x, y - 1);
-            line += "\u2580";  // the upper half of a block, over the background's colour
-        }
-        std::puts((line + "\033[0m").c_str());
-    }
-}
-
 static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -621,8 +587,8 @@ static std::string number(int frame) {
 
 // A line that is written over, for who waits at a terminal.
 static void progress([[maybe_unused]] int done, [[maybe_unused]] int all) {
-#ifdef TIOCGWINSZ
-    if (isatty(2)) std::fprintf(stderr, done < all ? "\rframe %d of %d" : "\r\033[K", done, all);
+#ifdef STDERR_FILENO
+    if (isatty(STDERR_FILENO)) std::fprintf(stderr, done < all ? "\rframe %d of %d" : "\r\033[K", done, all);
 #endif
 }
 
@@ -691,7 +657,7 @@ static void run(Arguments opt) {
     }
     const bool only_depth = opt.only == Arguments::Only::depth;
     const bool is_seen = only_depth ? !scene.casters.empty() : c.shaded > 0;
-    if (opt.show && is_seen) only_depth ? show(depth_picture(shadow.shadowbuffer, shadow.aspect)) : show(frame);
+    if (opt.show && is_seen) (only_depth ? depth_picture(shadow.shadowbuffer, shadow.aspect) : frame).print();
     note_darkness(opt, frame, is_seen);
     if (opt.quiet) return;
     const std::string left_out = missing_maps(scene.models) + (scene.casters.empty() ? ",shadow" : "");

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <initializer_list>
@@ -15,6 +16,9 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#if __has_include(<sys/ioctl.h>)
+#include <sys/ioctl.h>
+#endif
 #if __has_include(<sys/mman.h>)
 #include <sys/mman.h>
 #include <unistd.h>
@@ -319,6 +323,37 @@ void TGAImage::write_tga_file(const fs::path& path, bool rle) const {
     TGAFile file(*this, path, rle);
     file.write();
     file.commit();
+}
+
+void TGAImage::print() const {
+    const char* const wide = std::getenv("COLUMNS");
+    int columns = wide ? std::atoi(wide) : 0;
+#ifdef TIOCGWINSZ
+    if (winsize size{}; ioctl(1, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) columns = size.ws_col;
+#endif
+    const int w = std::min(columns > 0 ? columns : 80, w_);
+    const int h = std::max(1, w * h_ / w_);
+    const auto average = [&](int x, int y) {  // ";RED;GREEN;BLUE" of the pixels that come together there
+        const int left = x * w_ / w, right = (x + 1) * w_ / w;
+        const int low = y * h_ / h, high = (y + 1) * h_ / h;
+        std::string text;
+        for (const int c : {2, 1, 0}) {
+            long long sum = 0;
+            for (int i = low; i < high; i++)
+                for (int j = left; j < right; j++) sum += pixel(j, i)[bpp_ == 1 ? 0 : c];
+            text += ';' + std::to_string(sum / ((right - left) * (high - low)));
+        }
+        return text + 'm';
+    };
+    for (int y = h - 1; y >= 0; y -= 2) {
+        std::string line;
+        for (int x = 0; x < w; x++) {
+            line += "\033[38;2" + average(x, y);
+            if (y > 0) line += "\033[48;2" + average(x, y - 1);
+            line += "\u2580";  // the upper half of a block, over the background's colour
+        }
+        std::puts((line + "\033[0m").c_str());
+    }
 }
 
 TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(path) {

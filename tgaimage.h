@@ -52,6 +52,10 @@ public:
     // Makes it a file at PATH, see TGAFile.
     void write_tga_file(const std::filesystem::path& path, bool rle = true) const;
 
+    // Prints it on standard output, averaged down to the terminal's width, in blocks of 24-bit colours: a character is
+    // two pixels, one above the other. The width is the terminal's own, or COLUMNS, or 80.
+    void print() const;
+
     int width() const { return w_; }
     int height() const { return h_; }
     int bytespp() const { return bpp_; }
