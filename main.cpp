@@ -97,7 +97,7 @@ struct PhongShader final : IShader {
         material = &model.material(iface);
         varying_uv[nthvert] = model.uv(iface, nthvert);
         if (shadow.method != Options::Method::off) varying_sb[nthvert] = shadow.M * point(v);
-        if (nthvert == 2) sb_slope = depth_slope(varying_sb);
+        if (nthvert == 2 && shadow.method == Options::Method::map) sb_slope = depth_slope(varying_sb);
         if (!material->normal)
             varying_nrm[nthvert] = (uniform_MIT * direction(model.normal(iface, nthvert))).xyz();
         if (model.has_colors()) varying_color[nthvert] = model.color(iface, nthvert);
@@ -622,7 +622,7 @@ static void run(Arguments opt) {
     const double loaded = milliseconds();
     const bool moves = opt.move != Arguments::Move::nothing;
     const Arguments at_rest = opt;
-    const Model object = scene.models[0];
+    const Model object = opt.move == Arguments::Move::object ? scene.models[0] : Model();
     Shadow shadow;
     TGAImage frame(opt.width, opt.height, TGAImage::RGB);
     Counters c;
