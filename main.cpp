@@ -107,13 +107,10 @@ struct PhongShader final : IShader {
 
     Color fragment(const Fragment& f) const override {
         const UV uv = interpolated(varying_uv, f.bar);
-        Color texel = material->diffuse ? Texels(material->diffuse, uv).bgr() : Color{255, 255, 255};
-        if (model.has_colors()) {
-            const vec<3, real> rgb = to_real(interpolated(varying_color, f.bar));
-            texel = {texel.x * rgb.z, texel.y * rgb.y, texel.z * rgb.x};
-        }
-        const vec<3, real> n = normal(uv, f);
-        const vec<3, real> l = light_vector(f);
+        Color surface = material->diffuse ? Texels(material->diffuse, uv).bgr() : Color{255, 255, 255};
+        if (model.has_colors()) surface = reflected(surface, bgr(to_real(interpolated(varying_color, f.bar))));
+        surface = reflected(surface, bgr(material->Kd));
+        const vec<3, real> n = normal(uv, f), l = light_vector(f);
         const real diff = select(in_beam(f), max(0, dot(n, l)), 0);
         const mask facing = diff > 0;  // what is turned away has no light to lose: no shadow, no highlight
         const mask lit = any(facing) ? in_light(f) : false;
@@ -123,15 +120,12 @@ struct PhongShader final : IShader {
             spec = select(facing & (r.z > 0), power(r.z, Texels(material->specular, uv)[0]), 0);
         }
         const real shadow_factor = .3 + .7 * select(lit, 1, 0);
-        const vec3 Ke = material->Ke * 255;
-        const Color glow = material->glow ? Texels(material->glow, uv).bgr() : Color{Ke.z, Ke.y, Ke.x};
-        Color c;
-        for (int i = 0; i < 3; i++)  // Kd has red first
-            c[i] = 20 + texel[i] * material->Kd[2 - i] * ((1.2 * diff + .6 * spec) * shadow_factor) + glow[i];
+        const Color glow = material->glow ? Texels(material->glow, uv).bgr() : bgr(material->Ke * 255);
+        Color c = Color{20, 20, 20} + surface * ((1.2 * diff + .6 * spec) * shadow_factor) + glow;
 
         // --draw: when something is wrong, these are the first two things to look at.
         if (opt.draw == Options::Draw::shadow) c = Color{1, 1, 1} * select(facing, select(lit, 255, 0), 128);
-        if (opt.draw == Options::Draw::normal) c = Color{n.z, n.y, n.x} * 127.5 + Color{128, 128, 128};
+        if (opt.draw == Options::Draw::normal) c = bgr(n) * 127.5 + Color{128, 128, 128};
         return c;
     }
 
@@ -200,9 +194,8 @@ struct SkyShader final : IShader {
         varying_uv[nthvert] = model.uv(iface, nthvert);
     }
     Color fragment(const Fragment& f) const override {
-        const vec3 Kd = material->Kd * 255;
-        return material->diffuse ? Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr()
-                                 : Color{Kd.z, Kd.y, Kd.x};
+        if (!material->diffuse) return bgr(material->Kd * 255);
+        return Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr();
     }
 };
 

@@ -133,6 +133,15 @@ struct Fragment {
 
 using Color = vec<3, real>;  // a TGAColor in each lane: blue, green, red from 0 up; what is above 255 is drawn as 255
 
+// What a model says of colours has red first.
+template <typename T>
+INLINED Color bgr(const vec<3, T>& rgb) { return {rgb.z, rgb.y, rgb.x}; }
+
+// Light of a colour on a surface that reflects so much of each channel.
+INLINED Color reflected(const Color& light, const Color& share) {
+    return {light.x * share.x, light.y * share.y, light.z * share.z};
+}
+
 // A uniform is the same for a whole pass. A varying is written for each corner of a face, and fragment() reads it. Each
 // thread draws with a copy of its own.
 struct IShader {
