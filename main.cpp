@@ -8,9 +8,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 #if __has_include(<unistd.h>)
 #include <unistd.h>
@@ -454,18 +457,20 @@ static void note(const Arguments& opt, const std::string& what) {
 }
 
 struct Scene {
-    std::vector<Model> models, skies;  // one or none
+    std::vector<Model> models, skies;  // at most one sky
     Models sky;                        // if it is to be seen
-    Models seen;     // by the viewer: only these are shaded, and have textures
-    Models casters;  // may throw a shadow onto what is seen
+    Models seen;                       // by the viewer: only these are shaded, and have textures
+    Models casters;                    // may throw a shadow onto what is seen
+    Model object;                      // the first model at rest, if it goes round ...
+    vec3 axis;                         // ... this, where its own origin is
 };
 
 static Scene load(const Arguments& opt) {
     Scene scene;
-    for (const Arguments::Placed& placed : opt.models) {  // each file is read once, wherever and how often it is placed
-        const auto same = [&](const Arguments::Placed& p) { return p.path == placed.path; };
-        const auto first = std::find_if(opt.models.begin(), opt.models.end(), same) - opt.models.begin();
-        if (first < std::ssize(scene.models)) scene.models.push_back(scene.models[first]);
+    std::map<std::filesystem::path, std::size_t> first;  // a file is read once, however often it is placed
+    for (const Arguments::Placed& placed : opt.models) {
+        const auto [known, is_new] = first.emplace(placed.path, scene.models.size());
+        if (!is_new) scene.models.push_back(scene.models[known->second]);
         else scene.models.emplace_back(placed.path, opt.tangent ? NormalMap::tangent : NormalMap::object);
     }
     if (!opt.sky.empty() && opt.draw == Options::Draw::color && opt.only != Arguments::Only::depth) {
@@ -487,23 +492,21 @@ static Scene load(const Arguments& opt) {
 // What a frame does not need is left out.
 static void leave_out(const Arguments& opt, Scene& scene) {
     scene.seen = seen_by(viewer(opt), scene.models, opt.width, opt.height);
-    if (opt.method != Options::Method::off && opt.light == Options::Light::far)
-        scene.casters = casters(scene.models, scene.seen, lookat(opt.light_dir, opt.center, opt.up));
-    if (opt.method != Options::Method::off && opt.light != Options::Light::far) {
-        Camera light = light_camera(opt);
-        light.Viewport = viewport(0, 0, 1, 1);
-        scene.casters = scene.seen.empty() ? Models() : seen_by(light, scene.models, 1, 1);
-    }
+    if (opt.method != Options::Method::off) scene.casters = casters(scene.models, scene.seen, light_camera(opt));
     if (opt.only == Arguments::Only::depth) scene.seen.clear();
 }
 
 static void load_textures(const Arguments& opt, Scene& scene) {
     Model::Pictures pictures;
+    std::set<std::string> said;  // of a file that is placed twice only once
     const bool all = opt.move != Arguments::Move::nothing && opt.only != Arguments::Only::depth;  // may be seen later
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         Model& model = scene.models[i];
         if (all || std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures(pictures);
-        for (const std::string& what : model.notes()) note(opt, opt.models[i].path.string() + ": " + what);
+        for (const std::string& what : model.notes()) {
+            const std::string line = opt.models[i].path.string() + ": " + what;
+            if (said.insert(line).second) note(opt, line);
+        }
     }
 }
 
@@ -554,28 +557,21 @@ static void note_darkness(const Arguments& opt, const TGAImage& frame, bool is_s
 
 // The names of the kinds of map that no material of any model has, each after a comma.
 static std::string missing_maps(const std::vector<Model>& models) {
-    const auto is_missing = [&](Map Material::*map) {
-        for (const Model& model : models)
-            for (const Material& m : model.materials())
-                if (m.*map) return false;
-        return true;
-    };
     std::string names;
-    if (is_missing(&Material::diffuse)) names += ",diffuse";
-    if (is_missing(&Material::normal) && is_missing(&Material::tangent)) names += ",normal_map";
-    if (is_missing(&Material::specular)) names += ",specular";
-    if (is_missing(&Material::glow)) names += ",glow";
+    for (const auto& [name, map, or_else] : {std::tuple(",diffuse", &Material::diffuse, &Material::diffuse),
+                                             {",normal_map", &Material::normal, &Material::tangent},
+                                             {",specular", &Material::specular, &Material::specular},
+                                             {",glow", &Material::glow, &Material::glow}}) {
+        bool is_there = false;
+        for (const Model& model : models)
+            for (const Material& m : model.materials()) is_there = is_there || m.*map || m.*or_else;
+        if (!is_there) names += name;
+    }
     return names;
 }
 
 static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-static std::string number(int frame) {
-    char text[16];
-    std::snprintf(text, sizeof text, "_%04d", frame);
-    return text;
 }
 
 // A line that is written over, for who waits at a terminal.
@@ -590,34 +586,51 @@ static double median(std::vector<double>& values) {
     return values[values.size() / 2];
 }
 
-static void run(Arguments opt) {
-    const double start = milliseconds();
-    prepare_folder(opt);
-    Scene scene = load(opt);
-    const vec3 low = scene.models[0].low(), side = scene.models[0].high() - low;  // before it is fitted
+// Brings the scene to where it is drawn: fitted to the picture, and then with center, which matrices would have to undo
+// at the cost of digits if it were far off, at the origin.
+static void frame(Arguments& opt, Scene& scene) {
+    const Model& first = scene.models[0];
+    const vec3 low = first.low(), side = first.high() - low;
     // As the default eye sees it, so that a scene does not change its size when the eye moves; but whoever says what is
     // up has another view in mind.
     const bool has_up = !(opt.up == Options().up);
     if (opt.fit && fit(scene.models, has_up ? opt.eye - opt.center : Options().eye, opt.up)) {
         if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the lesson's leaves dark what faces the viewer
-        if (!opt.quiet) complain(opt.own_light ? "the scene is fitted to the picture (--no-fit)" :
-                                 "the scene is fitted to the picture and lit from 1,1,1 (--no-fit, --light X,Y,Z)", 0);
+        note(opt, opt.own_light ? "the scene is fitted to the picture (--no-fit)"
+                                : "the scene is fitted to the picture and lit from 1,1,1 (--no-fit, --light X,Y,Z)");
     }
     for (Model& model : scene.models) model.move([&](const vec3& v) { return v - opt.center; });
-    // Models and eye are now relative to center: no matrix has to undo a large translation, which costs digits.
     if (opt.light != Options::Light::far) opt.light_dir = opt.light_dir - opt.center;
     opt.eye = opt.eye - opt.center, opt.center = {0, 0, 0};
-    // Where the first model's own origin has come to: it turns about that.
-    const double size = norm(side), scale = size > 0 ? norm(scene.models[0].high() - scene.models[0].low()) / size : 1;
-    const vec3 axis = scene.models[0].low() + (opt.models[0].at - low) * scale;
+    const double size = norm(side), scale = size > 0 ? norm(first.high() - first.low()) / size : 1;
+    scene.axis = first.low() + (opt.models[0].at - low) * scale;
+}
+
+// A frame of a sequence: what moves has gone round up by its share of a turn.
+static void turn(const Arguments& at_rest, int frame, Arguments& opt, Scene& scene) {
+    const mat4 rotated = rotation(opt.up, 360. * frame / opt.frames);
+    const auto turned = [&](const vec3& v) { return (rotated * direction(v)).xyz(); };
+    if (opt.move == Arguments::Move::camera) opt.eye = turned(at_rest.eye);
+    if (opt.move == Arguments::Move::light) opt.light_dir = turned(at_rest.light_dir);
+    if (opt.move != Arguments::Move::object) return;
+    scene.models[0] = scene.object;
+    scene.models[0].turn = rotated * scene.object.turn;
+    scene.models[0].move([&](const vec3& v) { return turned(v - scene.axis) + scene.axis; });
+}
+
+static void run(Arguments opt) {
+    const double start = milliseconds();
+    prepare_folder(opt);
+    Scene scene = load(opt);
+    frame(opt, scene);
     leave_out(opt, scene);
     load_textures(opt, scene);
     const double loaded = milliseconds();
     const bool moves = opt.move != Arguments::Move::nothing;
     const Arguments at_rest = opt;
-    const Model object = opt.move == Arguments::Move::object ? scene.models[0] : Model();
+    if (opt.move == Arguments::Move::object) scene.object = scene.models[0];
     Shadow shadow;
-    TGAImage frame(opt.width, opt.height, TGAImage::RGB);
+    TGAImage picture(opt.width, opt.height, TGAImage::RGB);
     Counters c;
     std::string pictures, first_pictures;
     std::vector<double> depth_ms, shade_ms, write_ms;
@@ -625,24 +638,17 @@ static void run(Arguments opt) {
     for (int i = opt.first_frame; i < opt.end_frame; i++) {
         const Models casters_before = scene.casters;
         if (moves) {
-            const mat4 turn = rotation(opt.up, 360. * i / opt.frames);
-            const auto turned = [&](const vec3& v) { return (turn * direction(v)).xyz(); };
-            if (opt.move == Arguments::Move::camera) opt.eye = turned(at_rest.eye);
-            if (opt.move == Arguments::Move::light) opt.light_dir = turned(at_rest.light_dir);
-            if (opt.move == Arguments::Move::object) {
-                scene.models[0] = object;
-                scene.models[0].turn = turn * object.turn;
-                scene.models[0].move([&](const vec3& v) { return turned(v - axis) + axis; });
-            }
+            turn(at_rest, i, opt, scene);
             leave_out(opt, scene);
         }
         const double began = milliseconds();
         if (opt.move == Arguments::Move::camera && i > opt.first_frame && scene.casters == casters_before) spared++;
         else first_pass(opt, scene.casters, shadow);
         const double first = milliseconds();
-        if (opt.only != Arguments::Only::depth) c = second_pass(opt, scene.seen, scene.sky, shadow, frame);
+        if (opt.only != Arguments::Only::depth) c = second_pass(opt, scene.seen, scene.sky, shadow, picture);
         const double drawn = milliseconds();
-        if (moves || i + 1 == opt.end_frame) pictures = write(opt, shadow, frame, moves ? number(i) : "");
+        const std::string number = moves ? std::to_string(10000 + i).replace(0, 1, "_") : "";  // 12: _0012
+        if (moves || i + 1 == opt.end_frame) pictures = write(opt, shadow, picture, number);
         if (moves && first_pictures.empty()) first_pictures = pictures + " to ";
         depth_ms.push_back(first - began), shade_ms.push_back(drawn - first);
         write_ms.push_back(milliseconds() - drawn);
@@ -650,8 +656,8 @@ static void run(Arguments opt) {
     }
     const bool only_depth = opt.only == Arguments::Only::depth;
     const bool is_seen = only_depth ? !scene.casters.empty() : c.shaded > 0;
-    if (opt.show && is_seen) (only_depth ? depth_picture(shadow.shadowbuffer, shadow.aspect) : frame).print();
-    note_darkness(opt, frame, is_seen);
+    if (opt.show && is_seen) (only_depth ? depth_picture(shadow.shadowbuffer, shadow.aspect) : picture).print();
+    note_darkness(opt, picture, is_seen);
     if (opt.quiet) return;
     const std::string left_out = missing_maps(scene.models) + (scene.casters.empty() ? ",shadow" : "");
     if (!pictures.empty()) std::printf("wrote %s\n", (first_pictures + pictures).c_str());

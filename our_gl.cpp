@@ -179,11 +179,15 @@ Models seen_by(const Camera& camera, const Models& models, int width, int height
     return seen;
 }
 
-Models casters(const Models& models, const Models& receivers, const mat4& ModelView) {
+Models casters(const Models& models, const Models& receivers, const Camera& light) {
+    if (light.Projection[3].z != 0) {
+        const Camera reach{light.ModelView, light.Projection, viewport(0, 0, 1, 1)};
+        return receivers.empty() ? Models() : seen_by(reach, models, 1, 1);
+    }
     const auto box = [&](const Model* model) {
         constexpr double inf = std::numeric_limits<double>::infinity();
         vec3 low{inf, inf, inf}, high = -low;
-        for (const Corner& c : box_corners(*model, ModelView))
+        for (const Corner& c : box_corners(*model, light.ModelView))
             for (int i = 0; i < 3; i++) {
                 low[i] = std::min(low[i], c.at[i] - c.off[i]);
                 high[i] = std::max(high[i], c.at[i] + c.off[i]);

@@ -77,8 +77,9 @@ Camera fitted(const Camera& camera, const Models& models, int size);
 // Those of the models of which the camera may see a part on a picture of so many pixels: judged by their boxes.
 Models seen_by(const Camera& camera, const Models& models, int width, int height);
 
-// Those that may throw a shadow onto a receiver, judged by their boxes as the light's ModelView sees them.
-Models casters(const Models& models, const Models& receivers, const mat4& ModelView);
+// Those that may throw a shadow onto a receiver, judged by their boxes as the light sees them; where it has a place,
+// those before it and in [-1,1]^2, if there is a receiver.
+Models casters(const Models& models, const Models& receivers, const Camera& light);
 
 // ---- the z-buffer ----
 

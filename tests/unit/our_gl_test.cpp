@@ -56,6 +56,7 @@ TEST("a beam's border is where it says, at any depth, and the camera of a light 
             CHECK_NEAR(p.y / p.w, -1, 1e-12);
         }
     Random r(3);
+    std::size_t left_out = 0;
     for (int k = 0; k < 200; k++) {
         std::vector<vec3> corners;
         for (int i = 0; i < 30; i++) corners.push_back(r.point(1));
@@ -74,8 +75,18 @@ TEST("a beam's border is where it says, at any depth, and the camera of a light 
             CHECK(s.z > -1e-9);
         }
         CHECK(left > -1e-9 && right < 100 + 1e-9);
+        const Models lit = casters(scene, scene, unfitted);
+        CHECK(casters(scene, {}, unfitted).empty());
+        for (const Model& model : scene)
+            for (const vec3& v : model.verts()) {
+                const vec4 p = unfitted.to_clip() * point(v);
+                const bool is_reached = p.w > 0 && std::max(std::fabs(p.x), std::fabs(p.y)) < p.w;
+                CHECK(!is_reached || std::count(lit.begin(), lit.end(), &model) == 1);
+            }
+        left_out += scene.size() - lit.size();
         CHECK(crosses || right - left > 1);
     }
+    CHECK(left_out > 100);
 }
 
 TEST("the viewport's corners") {
