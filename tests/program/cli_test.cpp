@@ -177,7 +177,7 @@ TEST("--at, --turn and --scale place the model before them; a file is read once,
     const Outcome twice = f.run(view + "- -" + place + " <box.obj");  // standard input can be read only once
     CHECK(twice.status == 0 && twice.same_pictures(f.run(view + "box.obj placed.obj")));
     f.write("note.obj", prism([](const vec3& v) { return v; }) + "f 1 2\n");
-    CHECK_EQ(lines(f.run("--no-fit --size 9 note.obj note.obj --at 1,0,0").err), 1);
+    CHECK_EQ(lines(f.run("--no-fit --light 1,1,1 --size 9 note.obj note.obj --at 1,0,0").err), 1);
     for (const std::string wrong : {"--at 1,2,3 box.obj", "box.obj --turn x", "box.obj --scale 0", "box.obj --at 1"})
         check_refused(f, wrong, 2, "--");
 }
