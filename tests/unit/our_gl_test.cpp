@@ -76,11 +76,12 @@ TEST("a beam's border is where it says, at any depth, and the camera of a light 
             CHECK(s.z > -1e-9);
         }
         CHECK(left > -1e-9 && right < 100 + 1e-9);
-        const Models lit = casters(scene, scene, unfitted);
-        CHECK(casters(scene, {}, unfitted).empty());
+        const Camera narrow{unfitted.ModelView, beam(norm(place), 8)};
+        const Models lit = casters(scene, scene, narrow);
+        CHECK(casters(scene, {}, narrow).empty());
         for (const Model& model : scene)
             for (const vec3& v : model.verts()) {
-                const vec4 p = unfitted.to_clip() * point(v);
+                const vec4 p = narrow.to_clip() * point(v);
                 const bool is_reached = p.w > 0 && std::max(std::fabs(p.x), std::fabs(p.y)) < p.w;
                 CHECK(!is_reached || std::count(lit.begin(), lit.end(), &model) == 1);
             }
