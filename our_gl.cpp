@@ -921,6 +921,41 @@ static double area2(const vec3& a, const vec3& b, const vec3& c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
+// The cells of a face's box, and the float above its largest z: infinity for one that has a corner behind the light,
+// whose box is that of what is before it.
+struct LightGrid::Extent {
+    std::int16_t x0, x1, y0, y1;
+    float zmax;
+    bool is_cut() const { return zmax == INFINITY; }
+    int cells() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
+};
+
+LightGrid::Extent LightGrid::extent(int face) const {
+    vec3 p[4];
+    int n = 3;
+    bool is_cut = false;
+    for (const int v : faces_[face]) is_cut = is_cut || (!ws_.empty() && !(ws_[v] >= w_near));
+    if (is_cut) {
+        vec4 corners[3], cut[4];
+        for (int k = 0; k < 3; k++) {
+            const vec3& v = verts_[faces_[face][k]];
+            corners[k] = {v.x, v.y, v.z, ws_[faces_[face][k]]};
+        }
+        n = clip_polygon({3, 1, w_near}, corners, 3, cut);
+        for (int k = 0; k < n; k++) p[k] = project(cut[k]);
+    } else {
+        for (int k = 0; k < 3; k++) p[k] = on_screen(faces_[face][k]);
+    }
+    vec3 low = p[0], high = p[0];
+    for (int k = 1; k < n; k++)
+        for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[k][i]), high[i] = std::max(high[i], p[k][i]);
+    const auto cell = [&](double v) {  // NaN: 0
+        return v > 0 ? static_cast<std::int16_t>(std::min(v, cells_ - 1.)) : std::int16_t{0};
+    };
+    return {cell(low.x), cell(high.x), cell(low.y), cell(high.y),
+            is_cut ? INFINITY : std::nextafter(static_cast<float>(high.z), INFINITY)};
+}
+
 LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
     : cells_(cells), side_(cells), models_(models) {
     const mat4 to_screen = light.to_screen();
@@ -942,58 +977,22 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
         for (int i = begin; i < end; i++)
             for (int k = 0; k < 3; k++) faces_[first_face[m] + i][k] = first_vert[m] + models[m]->corner(i, k).vert;
     });
-    const auto on_screen = [&](int v) { return ws_.empty() ? verts_[v] : verts_[v] / ws_[v]; };
     for (int v = 0; v < first_vert.back(); v++) {
         const double z = std::fabs(on_screen(v).z);
         if (z <= 2 * screen_depth) zmax_ = std::max(zmax_, z);
     }
 
-    // The cells of each face's box, and the float above its largest z. A face that has a corner behind the light has a
-    // box of what is before it, and infinity for its largest z.
-    struct Extent {
-        std::int16_t x0, x1, y0, y1;
-        float zmax;
-        bool is_cut() const { return zmax == INFINITY; }
-        int cells() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
-    };
-    const auto bound_of_cut = [&](const std::array<int, 3>& face, vec3& low, vec3& high, vec3& other) {
-        vec4 corners[3], cut[4];
-        for (int k = 0; k < 3; k++) {
-            const vec3& v = verts_[face[k]];
-            corners[k] = {v.x, v.y, v.z, ws_[face[k]]};
-        }
-        const int n = clip_polygon({3, 1, w_near}, corners, 3, cut);
-        low = n > 0 ? vec3{INFINITY, INFINITY, INFINITY} : vec3{}, high = -low;
-        for (int k = 0; k < n; k++)
-            for (int i = 0; i < 3; i++) {
-                low[i] = std::min(low[i], cut[k][i] / cut[k].w);
-                high[i] = std::max(high[i], cut[k][i] / cut[k].w);
-            }
-        other = high;
-    };
-    std::vector<Extent> extents(faces_.size());
-    const auto cell_of = [&](double v) {  // NaN: 0
-        return v > 0 ? static_cast<std::int16_t>(std::min(v, cells_ - 1.)) : std::int16_t{0};
-    };
     // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a
     // face, the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of
     // faces.
     constexpr std::int64_t most_entries = 64;
+    std::vector<Extent> extents(faces_.size());
     for (;;) {
         std::atomic<std::int64_t> sum = 0;
         in_parts(first_face, [&](int, int m, int begin, int end, int) {
             std::int64_t own = 0;
             for (int i = first_face[m] + begin; i < first_face[m] + end; i++) {
-                bool is_cut = false;
-                vec3 a, b, c;  // the corners, or a box
-                for (int k = 0; k < 3 && !ws_.empty(); k++) is_cut = is_cut || !(ws_[faces_[i][k]] >= w_near);
-                if (!is_cut) a = on_screen(faces_[i][0]), b = on_screen(faces_[i][1]), c = on_screen(faces_[i][2]);
-                else bound_of_cut(faces_[i], a, b, c);
-                const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
-                const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
-                const float zmax =
-                    is_cut ? INFINITY : std::nextafter(static_cast<float>(std::max({a.z, b.z, c.z})), INFINITY);
-                extents[i] = {cell_of(x0), cell_of(x1), cell_of(y0), cell_of(y1), zmax};
+                extents[i] = extent(i);
                 own += extents[i].cells();
             }
             sum += own;
@@ -1002,7 +1001,11 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
         cells_ = (cells_ + 1) / 2, scale_ /= 2, side_ /= 2;
         for (vec3& v : verts_) v.x /= 2, v.y /= 2;
     }
+    fill(first_face, extents);
+}
 
+// Puts the faces, first_face[m] on those of model m, into the lists of the cells that they touch.
+void LightGrid::fill(const std::vector<int>& first_face, const std::vector<Extent>& extents) {
     // The cells on the rows [y_begin, y_end) that a face touches: of a larger box those that lie on the inner side of
     // its three edges, at least in part; asking costs more than it saves for a small one.
     const auto for_each_cell = [&](int face, int y_begin, int y_end, auto&& visit) {

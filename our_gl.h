@@ -303,6 +303,10 @@ private:
         float zmax;  // of the face, rounded up
         std::int32_t face;
     };
+    struct Extent;
+    Extent extent(int face) const;
+    void fill(const std::vector<int>& first_face, const std::vector<Extent>& extents);
+    vec3 on_screen(int v) const { return ws_.empty() ? verts_[v] : verts_[v] / ws_[v]; }
     mask covers(int face, const vec<3, coord>& p) const;
 
     struct Band {
