@@ -35,6 +35,12 @@ struct Options {  // the lesson's scene; the command line can change each of the
 
 // ---- pass 1: what the light sees ----
 
+// A light is a camera. One that is infinitely far off has no perspective; what another reaches comes to [-1,1]^2.
+static Camera light_camera(const Options& opt) {
+    return {lookat(opt.light_dir, opt.center, opt.up),
+            opt.light == Options::Light::far ? projection(0) : beam(norm(opt.light_dir), opt.half_angle)};
+}
+
 struct DepthShader final : IShader {  // only the z-buffer is wanted: there is no fragment()
     mat4 uniform_PM;  // Projection*ModelView
 
@@ -55,12 +61,6 @@ struct Shadow {  // what the first pass leaves for the second
 };
 
 // ---- pass 2: what the viewer sees ----
-
-// A light is a camera. One that is infinitely far off has no perspective; what another reaches comes to [-1,1]^2.
-static Camera light_camera(const Options& opt) {
-    return {lookat(opt.light_dir, opt.center, opt.up),
-            opt.light == Options::Light::far ? projection(0) : beam(norm(opt.light_dir), opt.half_angle)};
-}
 
 // Phong's reflection model with the lesson's weights, in eye coordinates. What a material has no map for is not
 // computed. fragment() is called for a few neighbouring pixels of a face at once: a coord says where each of them is, a
