@@ -905,9 +905,18 @@ coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, c
 }
 
 vec2 depth_slope(const vec4 (&corner)[3]) {
-    const auto at = [&](int i) { return corner[i].w == 1 ? corner[i].xyz() : project(corner[i]); };
-    const vec3 a = at(0), n = cross(at(1) - a, at(2) - a);
-    return {-n.x / n.z, -n.y / n.z};
+    // As in planes(), relative to the corner farthest in front: the others may be behind the light.
+    const auto w_is_less = [](const vec4& p, const vec4& q) { return p.w < q.w; };
+    const vec3 nearest = project(*std::max_element(corner, corner + 3, w_is_less));
+    vec3 v[3];
+    double z[3];
+    for (int i = 0; i < 3; i++) {
+        const vec4& p = corner[i];
+        v[i] = {p.x - nearest.x * p.w, p.y - nearest.y * p.w, p.w}, z[i] = p.z - nearest.z * p.w;
+    }
+    const vec3 e[3] = {cross(v[1], v[2]), cross(v[2], v[0]), cross(v[0], v[1])};
+    const vec3 sum = e[0] * z[0] + e[1] * z[1] + e[2] * z[2];
+    return vec2{sum.x, sum.y} / dot(v[0], e[0]);
 }
 
 int LightGrid::good_cells(const Models& models) {
