@@ -144,8 +144,13 @@ TEST("lights: spot and point at forty places") {
                           "--light 1,1,1 --spot 1,2,1,60"}, 300);
     for (const std::string& light : each("--% 1,2,1 ", {"light", "spot", "point"}))  // a second yard in the first
         the_yard.check_exact(each(light + "m.obj --at .5,%,.3 --turn 30 --scale .3", {"0", "-.35", "1e3"}), 300);
-    for (const double n : {1., .1, .01, .001}) {  // a plane that is low under the light has no acne
-        const Scene plane(net({0, 1, 0}, {}, 8), "--no-fit");
+    const Scene plane(net({0, 1, 0}, {}, 8), "--no-fit");
+    for (int k = 0; k < 12; k++) {  // a plane has no acne, wherever the light above it is
+        const vec3 at = r.point(std::array{.05, .5, 3., 30.}[k % 4]);
+        const vec3 place{at.x, std::fabs(at.y) * (k % 3 ? 1 : 1e-3), at.z};
+        plane.check_lit("--shadow-size 999 --eye 0,4,1 --point " + triple(place) + (k % 2 ? ",89" : ",45"), 800);
+    }
+    for (const double n : {1., .1, .01, .001}) {
         plane.check_lit("--point 0," + std::to_string(n) + ",0,89 --eye 0,4,1", 800);
         plane.check_lit("--spot 1.5," + std::to_string(n) + ",0,60 --eye 0,4,1", 400);
     }

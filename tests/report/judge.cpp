@@ -16,16 +16,13 @@ static std::string copy_of(const Model& model, const Model& fitted, const LightS
     std::string faces;
     for (int face = 0; face < model.nfaces(); face++) {
         std::string corners = "f";
-        // Between its corners the way to a light next to a face turns; the face's own normal holds it up.
+        // The way to a light with a place turns from corner to corner; but every point of a face that faces the light at
+        // all is on that side of its plane.
         const vec3 a = fitted.vert(face, 0), own = cross(fitted.vert(face, 1) - a, fitted.vert(face, 2) - a);
-        for (int c = 0; c < 3; c++) {
-            const bool is_far = light.kind == LightSource::far_off;
-            vec3 n = normalized(is_far ? light.at
-                                             : normalized(light.at - fitted.vert(face, c)) + normalized(own));
-            n = (transpose(fitted.turn) * direction(n)).xyz();  // the program will turn it
-            faces += "vn " + number(n.x) + ' ' + number(n.y) + ' ' + number(n.z) + '\n';
-            corners += ' ' + std::to_string(copy.vertex(model.vert(face, c))) + "//-" + std::to_string(3 - c);
-        }
+        const vec3 towards = normalized(light.kind == LightSource::far_off ? light.at : own);
+        const vec3 n = (transpose(fitted.turn) * direction(towards)).xyz();  // the program will turn it
+        faces += "vn " + number(n.x) + ' ' + number(n.y) + ' ' + number(n.z) + '\n';
+        for (int c = 0; c < 3; c++) corners += ' ' + std::to_string(copy.vertex(model.vert(face, c))) + "//-1";
         faces += corners + '\n';
     }
     return copy.text() + faces;
