@@ -237,6 +237,10 @@ TGAImage depth_picture(const DepthBuffer& depths, double aspect) {
     return picture;
 }
 
+vec<2, coord> moved(const Map& map, const UV& uv) {
+    return UV({uv.given.x * map.scale.x + map.offset.x, uv.given.y * map.scale.y + map.offset.y}).wrapped;
+}
+
 // ---- threads ----
 
 namespace {

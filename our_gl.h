@@ -174,12 +174,14 @@ struct UV {
     })) {}
 };
 
+// Where a map that is scaled and shifted has them. Called, because few maps are and many look-ups ask.
+vec<2, coord> moved(const Map& map, const UV& uv);
+
 // The texels (floor(u*w), floor(v*h)) of a map's picture, one a lane: the nearest. [i] is their channel i.
 class Texels {
 public:
     INLINED Texels(const Map& map, const UV& at) {
-        const vec<2, coord> uv = map.is_moved ? UV({at.given.x * map.scale.x + map.offset.x,
-                                                      at.given.y * map.scale.y + map.offset.y}).wrapped : at.wrapped;
+        const vec<2, coord> uv = map.is_moved ? moved(map, at) : at.wrapped;
         const int w = map->width(), h = map->height();
         const pack<std::int32_t> x = min(to_int(uv.x * w), w - 1), y = min(to_int(uv.y * h), h - 1);
         std::uint32_t index[lanes];  // a picture may have up to 2^32 pixels
