@@ -16,8 +16,8 @@ static std::string copy_of(const Model& model, const Model& fitted, const LightS
     std::string faces;
     for (int face = 0; face < model.nfaces(); face++) {
         std::string corners = "f";
-        // The way to a light with a place turns from corner to corner; but every point of a face that faces the light at
-        // all is on that side of its plane.
+        // The way to a light with a place turns from corner to corner; but every point of a face that faces the light
+        // at all is on that side of its plane.
         const vec3 a = fitted.vert(face, 0), own = cross(fitted.vert(face, 1) - a, fitted.vert(face, 2) - a);
         const vec3 towards = normalized(light.kind == LightSource::far_off ? light.at : own);
         const vec3 n = (transpose(fitted.turn) * direction(towards)).xyz();  // the program will turn it

@@ -60,7 +60,8 @@ TEST("a beam's border is where it says, at any depth, and the camera of a light 
     for (int k = 0; k < 200; k++) {
         std::vector<vec3> corners;
         for (int i = 0; i < 10; i++)
-            for (const vec3 middle = r.point(1); corners.size() < 3u * (i + 1);) corners.push_back(middle + r.point(.15));
+            for (const vec3 middle = r.point(1); corners.size() < 3u * (i + 1);)
+                corners.push_back(middle + r.point(.15));
         const std::vector<Model> scene = triangles(corners);
         const vec3 place = r.point(3);
         const Camera unfitted{lookat(place, {}, {0, 1, 0}), beam(norm(place), 40)};
