@@ -29,6 +29,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
     double zoom = 1;  // about the middle of the picture
     enum class Method { map, exact, off } method = Method::map;  // of shadows
+    Faces caster_faces = Faces::all;  // those drawn into the shadow buffer
     std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
 };
@@ -230,7 +231,7 @@ static void first_pass(const Options& opt, const Models& casters, Shadow& shadow
     std::vector<DepthShader> shaders;
     for (const Model* model : casters) shaders.emplace_back(*model, light);
     if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);  // kept from frame to frame
-    draw(shaders, light.Viewport, shadow.shadowbuffer);
+    draw(shaders, light.Viewport, shadow.shadowbuffer, opt.caster_faces);
 }
 
 // Rendering the frame buffer: the camera stands at the viewer, and each fragment asks whether the light sees it too.
@@ -376,6 +377,8 @@ static const Option options[] = {
      [](Arguments& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
     {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
      [](Arguments& o, const Value& v) { v.read(o.bias.emplace()); }},
+    {"--casters", "FACES", "of closed bodies the back ones are enough in the shadow buffer: all or back (all)",
+     [](Arguments& o, const Value& v) { o.caster_faces = Faces(v.one_of({"all", "back"})); }},
     {"--draw", "WHAT", "color; shadow: white lit, black in shadow, grey turned away from the light; normal (color)",
      [](Arguments& o, const Value& v) { o.draw = Options::Draw(v.one_of({"color", "shadow", "normal"})); }},
     {"--only", "WHAT", "framebuffer, or depth: one of the two pictures, without what it does not need (both)",
@@ -425,6 +428,8 @@ static Arguments parse(int argc, char** argv) {
     }
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
     if (opt.bias && opt.method != Options::Method::map) throw UsageError("--bias belongs to --shadow map");
+    if (opt.caster_faces == Faces::back && opt.method != Options::Method::map)
+        throw UsageError("--casters back belongs to --shadow map");
     const bool is_far = opt.light == Options::Light::far;
     if (is_far && opt.light_dir == vec3{}) throw UsageError("--light has no direction");
     if (!is_far && !std::isfinite(1 / norm(opt.light_dir - opt.center)))

@@ -655,6 +655,7 @@ struct Pass {
     const int width, height;
     DepthBuffer* const zbuffer;  // one of the two is drawn into
     TGAImage* const picture;
+    const Faces drawn;           // which faces
 
     // The picture is drawn in strips of rows, each by one thread from the first face to the last: so a pixel sees the
     // faces in their order. A strip's depths and marks, 8 bytes a pixel, fit into the cache of a core.
@@ -753,7 +754,7 @@ struct Pass {
                 Point corners[most_corners];
                 const int n = corners_of(face, screen, corners);
                 bound(corners, n, width, height, face);
-                planes(screen, face);
+                if (planes(screen, face).front_facing && drawn == Faces::back) continue;
                 for (int k = 2; k < n; k++) {  // what has been cut is a fan of triangles
                     const Point* const abc[] = {&corners[0], &corners[k - 1], &corners[k]};
                     covered = covered + triangle(face, abc, y_begin, y_end, depth, w);
@@ -871,12 +872,12 @@ Counters& Counters::operator+=(const Counters& c) {
     return *this;
 }
 
-Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer) {
-    return Pass{shader, nshaders, Viewport, zbuffer.width(), zbuffer.height(), &zbuffer, nullptr}.draw();
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer, Faces faces) {
+    return Pass{shader, nshaders, Viewport, zbuffer.width(), zbuffer.height(), &zbuffer, nullptr, faces}.draw();
 }
 Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImage& picture) {
     assert(picture.bytespp() >= 3 && std::max(picture.width(), picture.height()) <= max_size);
-    return Pass{shader, nshaders, Viewport, picture.width(), picture.height(), nullptr, &picture}.draw();
+    return Pass{shader, nshaders, Viewport, picture.width(), picture.height(), nullptr, &picture, Faces::all}.draw();
 }
 
 // ---- shadows ----

@@ -243,23 +243,25 @@ int thread_count();
 void parallel_for(int n, const std::function<void(int i, int thread)>& work);
 
 // A pass: draws the faces of all shaders. Into a z-buffer go the depths of what is nearest, whatever it held before
-// (the first drawn wins a tie). Into a picture of three or four channels go the colours: fragment() is called once for
-// every pixel that is seen, however many faces lie behind it, and the rest is black. shader(i, thread) is the thread's
-// own copy of the i-th.
+// (the first drawn wins a tie), of all faces or of those alone that are seen from behind. Into a picture of three or
+// four channels go the colours: fragment() is called once for every pixel that is seen, however many faces lie behind
+// it, and the rest is black. shader(i, thread) is the thread's own copy of the i-th.
 using Shaders = std::function<IShader&(int i, int thread)>;
-Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer);
+enum class Faces { all, back };
+Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, DepthBuffer& zbuffer, Faces faces);
 Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImage& picture);
 
-template <class Shader, class Target>
-Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, Target& target) {
+template <class Shader>
+Counters draw(const std::vector<Shader>& shaders, const mat4& Viewport, DepthBuffer& zbuffer,
+              Faces faces = Faces::all) {
     std::vector<std::vector<Shader>> own(thread_count(), shaders);
     const auto shader = [&](int i, int thread) -> IShader& { return own[thread][i]; };
-    return draw(shader, static_cast<int>(shaders.size()), Viewport, target);
+    return draw(shader, static_cast<int>(shaders.size()), Viewport, zbuffer, faces);
 }
 
-template <class Shader, class Other, class Target>
+template <class Shader, class Other = Shader>
 Counters draw(const std::vector<Shader>& shaders, const std::vector<Other>& others, const mat4& Viewport,
-              Target& target) {
+              TGAImage& picture) {
     const int n = static_cast<int>(shaders.size());
     std::vector<std::vector<Shader>> own(thread_count(), shaders);
     std::vector<std::vector<Other>> other(thread_count(), others);
@@ -267,7 +269,7 @@ Counters draw(const std::vector<Shader>& shaders, const std::vector<Other>& othe
         if (i < n) return own[thread][i];
         return other[thread][i - n];
     };
-    return draw(shader, n + static_cast<int>(others.size()), Viewport, target);
+    return draw(shader, n + static_cast<int>(others.size()), Viewport, picture);
 }
 
 // ---- shadows ----

@@ -32,8 +32,8 @@ Scene::Scene(const Strings& arguments, const Folder& folder)
     : threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
     std::map<std::string, std::string> values;  // of the options that have one: the last that is given, or nothing
     for (const char* option : {"-o", "--output", "--size", "--shadow-size", "--eye", "--center", "--up", "--zoom",
-                               "--light", "--spot", "--point", "--beam", "--sky", "--shadow", "--bias", "--draw",
-                               "--only", "--threads", "--frames"})
+                               "--light", "--spot", "--point", "--beam", "--sky", "--shadow", "--casters", "--bias",
+                               "--draw", "--only", "--threads", "--frames"})
         values[option];
     bool fits = true;
     std::string lamp;  // the last of three options that say which
@@ -137,8 +137,9 @@ PictureError Judge::error(const Strings& method) {
         scene_.emplace(arguments_, program_);
         truth_ = cast(RayCaster(scene_->models), scene_->view, scene_->light, scene_->threads);
         Strings exact = arguments_;
-        for (auto bias = exact.end(); (bias = std::find(exact.begin(), exact.end(), "--bias")) != exact.end();)
-            exact.erase(bias, bias + 2);
+        for (const char* of_map : {"--bias", "--casters"})
+            for (auto at = exact.end(); (at = std::find(exact.begin(), exact.end(), of_map)) != exact.end();)
+                exact.erase(at, at + 2);
         exact_ = draw(exact, {"--shadow", "exact", "--draw", "color"});
     }
     // What shadows what does not depend on the normals. Where they all point to the light, no pixel is grey.

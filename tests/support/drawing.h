@@ -45,7 +45,7 @@ Drawing drawing(const Shader& shader, int width, int height, const mat4& Viewpor
     Drawing d{DepthBuffer(width, height), TGAImage(width, height, TGAImage::RGB), {}};
     const std::vector<Shader> shaders{shader};
     draw(shaders, Viewport, d.z);
-    d.count = draw(shaders, Viewport, d.picture);
+    d.count = draw(shaders, {}, Viewport, d.picture);
     return d;
 }
 inline Drawing drawing(const std::vector<vec4>& clip, int width, int height) {
