@@ -494,6 +494,36 @@ TEST("idol, floor and sky, under a spot light") {
                     obj + "/floor/floor.obj"), "spot_under_sky");
 }
 
+// The idol on its floor under the sky, and every kind of light: beside it, behind it, in its midst; beams that end on its
+// nose and beams that pass the picture on all sides; and one low above the floor, half of which is behind the light.
+TEST("the whole scene under every light") {
+    const Scene folder([](Scene&) {});
+    const std::string obj = UMBRA_OBJ_DIR, floor = ' ' + obj + "/floor/floor.obj";
+    const std::string scene = " --sky " + obj + "/sky/sky.obj " + obj + "/idol/idol.obj" + floor;
+    const std::string small = "--no-fit --size 96 --shadow-size 384 ";
+    const std::pair<const char*, const char*> lights[] = {
+        {"light", "--light 1,1,1"},
+        {"spot_5", "--spot 2,3,2.5,5"},
+        {"spot_25", "--spot 2,3,2.5"},
+        {"spot_80", "--spot .8,1.2,1,80"},
+        {"square_5", "--spot 2,3,2.5,5 --beam square"},
+        {"square_25", "--spot 2,3,2.5 --beam square"},
+        {"point", "--point 1.2,1.2,1.2"},
+        {"behind", "--spot -1.5,2,-2.5,30"},
+        {"half_floor", "--spot .2,-.3,1.3,80"}};
+    for (const auto& [name, light] : lights)
+        check(folder.draw(small + light + scene), std::string("idol_") + name);
+    check(folder.draw(small + "--spot 2,3,2.5 " + obj + "/idol/idol.obj " + obj +
+                      "/knot/knot.obj --scale .35 --at 1,-.6,.6" + floor), "idol_and_knot");
+    for (const std::string what : {"object", "camera", "light"})
+        for (const std::string frame : {"0", "7", "23"}) {
+            const std::string range = frame + ":" + std::to_string(std::stoi(frame) + 1) + "/36";
+            const std::string number = std::string(4 - frame.size(), '0') + frame;
+            check(folder.draw(small + "--spot 2,3,2.5,60 --frames " + range + " --move " + what + scene,
+                              "framebuffer_" + number + ".tga"), "move_" + what + "_" + number);
+        }
+}
+
 TEST("a wrong bias or camera is another picture") {
     const Scene yard(add_yard);
     const TGAImage reference = TGAImage::read_tga_file(fs::path(UMBRA_REFERENCE_DIR) / "no_textures.tga");
