@@ -19,9 +19,9 @@ The first prints what umbra's picture is off by: pixels that only one of picture
 the light; those of them that are falsely dark and falsely lit, as counts and in percent; and the RMSE of their colours.
 
 The second, with -o or --rounds or without any argument, prints these figures, milliseconds and bytes of each shadow
-method at each size of its buffer, and what theory says of the error; and the errors of stiff cases. It writes
-report.csv, stiffness.csv and report.svg into the folder DIR (.). The milliseconds are medians of N rounds (5) of N
-threads (1).
+method at each size of its buffer, and what theory says of the error; the errors of stiff cases; and the figures of
+spot and point lights. It writes report.csv, stiffness.csv, lights.csv and report.svg into the folder DIR (.). The
+milliseconds are medians of N rounds (5) of N threads (1).
 )";
 
 constexpr const char* bias = "43.34";           // the lesson's, of a depth of 2000 for two units of the scene ...
@@ -39,6 +39,29 @@ std::vector<Figures> methods() {
             all.push_back({name, size, joined(arguments, {"--shadow-size", std::to_string(size)})});
     all.push_back({"exact", 0, {"--shadow", "exact"}});
     all.push_back({.method = "off", .arguments = {"--shadow", "off"}, .rival = false});
+    return all;
+}
+
+void set_errors(Figures& f, const PictureError& e) {
+    f.acne = e.percent(e.falsely_dark), f.leak = e.percent(e.falsely_lit), f.error = e.percent(), f.rmse = e.rmse;
+}
+
+// Of lights with a place: kinds, half angles, and sizes of the buffer.
+std::vector<Figures> lights(const Program& umbra, const Strings& scene) {
+    std::vector<Figures> all;
+    for (const std::string kind : {"spot", "point"})
+        for (const std::string& place : each(".3,.3,.9,%", {"10", "45", "80"})) {
+            const Strings light{"--" + kind, place};
+            Judge judge(umbra, joined(scene, light));
+            for (const std::string size : {"512", "1024", "2048", "4096", "exact"}) {
+                const Strings how = size == "exact" ? Strings{"--shadow", size} : Strings{"--shadow-size", size};
+                Figures& f = all.emplace_back();
+                f.method = kind + " " + place.substr(place.rfind(',') + 1) + (size == "exact" ? ", exact" : "");
+                f.size = size == "exact" ? 0 : std::stoi(size), f.arguments = joined(light, how);
+                std::cerr << "report: errors of " << f.method << ' ' << size << '\n';
+                set_errors(f, judge.error(how));
+            }
+        }
     return all;
 }
 
@@ -144,14 +167,18 @@ void make_table(const Program& umbra, Strings scene) {
     Judge judge(umbra, joined(scene, {"--size", side}));
     for (Figures& f : figures) {
         std::cerr << "report: errors of " << f.method << ' ' << f.size << '\n';
-        const PictureError e = judge.error(f.arguments);
-        f.acne = e.percent(e.falsely_dark), f.leak = e.percent(e.falsely_lit), f.error = e.percent(), f.rmse = e.rmse;
+        set_errors(f, judge.error(f.arguments));
     }
-    measure_times(umbra, joined(scene, {"--size", side, "--threads", threads}), n, figures);
+    const Strings timed = joined(scene, {"--size", side, "--threads", threads});
+    measure_times(umbra, timed, n, figures);
+    std::vector<Figures> of_lights = lights(umbra, joined(scene, {"--size", side}));
+    measure_times(umbra, timed, n, of_lights);
     predict_errors(umbra, joined(scene, {"--size", fine_side}), figures);
     mark_frontier(figures);
     const std::vector<StiffRow> stiff = measure_stiffness(umbra);
     print(figures, stiff);
+    std::puts("\nLights with a place, their half angle.");
+    print_columns(csv(of_lights), 2, 10);
 
     std::string title = "Shadow error against time:";
     for (const std::string& path : Scene(scene, umbra).paths)
@@ -159,7 +186,7 @@ void make_table(const Program& umbra, Strings scene) {
     const std::string subtitle = side + (" pixels, threads: " + threads) + ", median of " + rounds +
                                  " runs. Numbers at the marks: texels a side of the shadow buffer.";
     for (const auto& [name, text] : {std::pair<const char*, std::string>{"report.csv", csv(figures)},
-                                     {"stiffness.csv", csv(stiff)}, {"report.svg", svg(figures, title, subtitle)}})
+                                     {"lights.csv", csv(of_lights)}, {"stiffness.csv", csv(stiff)}, {"report.svg", svg(figures, title, subtitle)}})
         write_bytes(out / name, Bytes(text.begin(), text.end()));
 }
 

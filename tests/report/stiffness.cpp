@@ -7,6 +7,7 @@
 
 #include "judge.h"
 #include "our_gl.h"
+#include "random.h"
 #include "scenes.h"
 
 namespace {
@@ -35,6 +36,21 @@ std::string needles(double length_to_width) {
 
 PictureError error(const Program& umbra, const Strings& arguments) {
     return Judge(umbra, joined({"--size", "400x400"}, arguments)).error();
+}
+
+long wrong(const PictureError& e) { return e.coverage + e.falsely_dark + e.falsely_lit; }
+
+// The wrong pixels of exact shadows under so many spot and point lights: some of them inside of the model's hull, with
+// casters behind them.
+long wrong_under_lights(const Program& umbra, const Strings& scene, int lights) {
+    Random r(11);
+    long sum = 0;
+    for (int k = 0; k < lights; k++) {
+        const char* const angle = std::array{",5", ",10", ",45", ",80", ",89"}[k % 5];
+        const Strings light{k % 2 ? "--point" : "--spot", triple(r.point(k % 4 ? 1.5 : 6)) + angle};
+        sum += wrong(error(umbra, joined(joined({"--shadow", "exact", "--no-fit"}, light), scene)));
+    }
+    return sum;
 }
 
 // ---- matrices, in any arithmetic ----
@@ -175,8 +191,7 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
                                   const Strings& view, const std::function<std::string(double)>& scene) {
         family(name, "exact: wrong pixels", bearable, steps, [&](double s) {
             const std::string path = umbra.write("scene.obj", scene(s));
-            const PictureError e = error(umbra, joined(view, {"--shadow", "exact", path}));
-            return static_cast<double>(e.coverage + e.falsely_dark + e.falsely_lit);
+            return static_cast<double>(wrong(error(umbra, joined(view, {"--shadow", "exact", path}))));
         });
     };
     wrong_pixels("model scaled by", 0, {1e-300, 1e-30, 1e-6, 1, 1e6, 1e30, 1e300}, {},
@@ -190,6 +205,18 @@ std::vector<StiffRow> measure_stiffness(const Program& umbra) {
                      {"--no-fit", "--center", triple(center), "--eye", triple(center + vec3{.25, .125, 1} * d)},
                      [](double) { return yard(1); });
     }
+    for (const double degrees : {1e-6, 1e-3, 1., 45., 89.})
+        wrong_pixels("spot light: half angle", 0, {degrees}, {"--spot", "1,2,1," + number(degrees)},
+                     [](double) { return yard(1); });
+    for (const double d : {1e-6, 1e-3, 1., 1e3, 1e6})
+        wrong_pixels("point light: distance from center", 0, {d},
+                     {"--center", "0,.3,0", "--point", triple(vec3{0, .3, 0} + vec3{1, 2, 1} * d)},
+                     [](double) { return yard(1); });
+    for (const std::string name : {"idol", "knot"})
+        family("lights among the " + name + "'s faces", "exact: wrong pixels", 0, {40}, [&](double lights) {
+            const Strings scene{UMBRA_OBJ_DIR "/" + name + "/" + name + ".obj", UMBRA_OBJ_DIR "/floor/floor.obj"};
+            return static_cast<double>(wrong_under_lights(umbra, scene, static_cast<int>(lights)));
+        });
     // Coverage is snapped by up to 2^-17 pixel: 120 long edges of 240 pixels sweep over 120 * 240 * 2^-17 = .22 pixels'
     // centres. More than 3 would be a fault (Poisson: one time in 10 000).
     wrong_pixels("needles: length to width", 3, {1e1, 1e3, 1e5, 1e7, 1e9}, {"--no-fit", "--light", ".3,.2,1"},
