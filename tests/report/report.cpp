@@ -50,7 +50,7 @@ void set_errors(Figures& f, const PictureError& e) {
 std::vector<Figures> lights(const Program& umbra, const Strings& scene) {
     std::vector<Figures> all;
     for (const std::string kind : {"spot", "point"})
-        for (const std::string& place : each(".3,.3,.9,%", {"10", "45", "80"})) {
+        for (const std::string& place : each(".8,.6,1,%", {"10", "45", "80"})) {
             const Strings light{"--" + kind, place};
             Judge judge(umbra, joined(scene, light));
             for (const std::string size : {"512", "1024", "2048", "4096", "exact"}) {
