@@ -6,6 +6,7 @@
 #include "tgaimage.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <map>
@@ -257,7 +258,8 @@ struct Arguments : Options {  // what else the command line says
     std::filesystem::path sky;
     std::filesystem::path out = ".";
     enum class Only { both, framebuffer, depth } only = Only::both;  // of the pictures
-    bool own_light = false, tangent = false, fit = true, show = false, quiet = false, help = false, version = false;
+    bool own_light = false, tangent = false, fit = true;
+    bool show = false, view = false, quiet = false, help = false, version = false;
     int threads = 0;  // 0: all processors
     int frames = 1, first_frame = 0, end_frame = 1;
     enum class Move { nothing, object, camera, light } move = Move::nothing;  // goes round up once in so many frames
@@ -396,6 +398,8 @@ static const Option options[] = {
          o.move = Arguments::Move(v.one_of({"nothing", "object", "camera", "light"}));
      }},
     {"--show", "", "print the picture in the terminal, too", [](Arguments& o, const Value&) { o.show = true; }},
+    {"--view", "", "show the scene in the terminal, where keys move it",
+     [](Arguments& o, const Value&) { o.view = true; }},
     {"--quiet", "", "print errors only", [](Arguments& o, const Value&) { o.quiet = true; }, "-q"},
     {"--help", "", "print this", [](Arguments& o, const Value&) { o.help = true; }, "-h"},
     {"--version", "", "print the version", [](Arguments& o, const Value&) { o.version = true; }, "-V"},
@@ -504,7 +508,8 @@ static void leave_out(const Arguments& opt, Scene& scene) {
 static void load_textures(const Arguments& opt, Scene& scene) {
     Model::Pictures pictures;
     std::set<std::string> said;  // of a file that is placed twice only once
-    const bool all = opt.move != Arguments::Move::nothing && opt.only != Arguments::Only::depth;  // may be seen later
+    // What moves may be seen later.
+    const bool all = (opt.view || opt.move != Arguments::Move::nothing) && opt.only != Arguments::Only::depth;
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         Model& model = scene.models[i];
         if (all || std::count(scene.seen.begin(), scene.seen.end(), &model)) model.load_textures(pictures);
@@ -623,6 +628,78 @@ static void turn(const Arguments& at_rest, int frame, Arguments& opt, Scene& sce
     scene.models[0].move([&](const vec3& v) { return turned(v - scene.axis) + scene.axis; });
 }
 
+// What a key does to the camera, the light and the shadows; false for one that means nothing. Angles go in steps of 5
+// degrees.
+static bool obey(char key, Arguments& o) {
+    const auto about = [](const vec3& axis, double degrees, vec3& v) {
+        v = (rotation(axis, degrees) * direction(v)).xyz();
+    };
+    const auto lift = [&](double degrees, vec3& v) {  // not over the top, where left and right change places
+        vec3 lifted = v;
+        about(cross(v, o.up), degrees, lifted);
+        if (norm(cross(normalized(lifted), normalized(o.up))) > .1) v = lifted;
+    };
+    constexpr double biases[] = {0, 10, 43.34, 100};
+    switch (key) {
+        case '<': return about(o.up, -5, o.eye), true;
+        case '>': return about(o.up, 5, o.eye), true;
+        case '^': return lift(5, o.eye), true;
+        case 'v': return lift(-5, o.eye), true;
+        case 'a': return about(o.up, -5, o.light_dir), true;
+        case 'd': return about(o.up, 5, o.light_dir), true;
+        case 'w': return lift(5, o.light_dir), true;
+        case 's': return lift(-5, o.light_dir), true;
+        case 'l':  // a direction becomes a place as far off as the viewer
+            if (o.light == Options::Light::far) o.light_dir = normalized(o.light_dir) * norm(o.eye);
+            o.light = Options::Light((int(o.light) + 1) % 3);
+            o.half_angle = o.light == Options::Light::spot ? 25 : 80;
+            return true;
+        case 'm': return o.method = Options::Method((int(o.method) + 1) % 3), o.bias.reset(), true;
+        case 'b': {
+            const double* const next = std::upper_bound(std::begin(biases), std::end(biases), o.bias.value_or(-1));
+            o.bias = next == std::end(biases) ? std::nullopt : std::optional(*next);
+            return o.method == Options::Method::map;
+        }
+        default: return false;
+    }
+}
+
+// The scene in the terminal, until q: drawn again whenever a key changes it, or in turns of 180 pictures.
+static void view(Arguments at_rest, Scene& scene) {
+    Terminal terminal;
+    if (at_rest.move == Arguments::Move::nothing) at_rest.move = Arguments::Move::object;
+    at_rest.frames = 180;
+    scene.object = scene.models[0];
+    Shadow shadow;
+    bool turns = false;
+    int i = 0;
+    double began = 0;
+    const auto rest = [&] { return std::max(0, static_cast<int>(20 + began - milliseconds())); };  // 50 pictures a second
+    for (char key = 0; key != 'q'; key = terminal.key(turns ? rest() : -1)) {
+        if (key == ' ') turns = !turns;
+        const bool is_new = obey(key, at_rest), resized = key == 0;
+        if (turns) i = (i + 1) % at_rest.frames;
+        if (!turns && !is_new && !resized && key != 'p') continue;
+        began = milliseconds();
+        Arguments opt = at_rest;
+        turn(at_rest, i, opt, scene);
+        const auto drawn = [&](int width, int height) {
+            opt.width = width, opt.height = height;
+            leave_out(opt, scene);
+            first_pass(opt, scene.casters, shadow);
+            TGAImage picture(width, height, TGAImage::RGB);
+            second_pass(opt, scene.seen, scene.sky, shadow, picture);
+            return picture;
+        };
+        std::string line = std::array{"light", "spot light", "point light"}[int(opt.light)];
+        line += std::array{", shadow map, bias ", ", exact shadows", ", no shadows"}[int(opt.method)];
+        if (opt.method == Options::Method::map) line += opt.bias ? std::to_string(*opt.bias).substr(0, 5) : "derived";
+        line += "   arrows: camera  wasd: light  space: turn  l: light  m: shadows  b: bias  p: write  q: quit";
+        if (key == 'p') line = "wrote " + write(opt, shadow, drawn(opt.width, opt.height), "");
+        terminal.show(drawn(terminal.columns(), 2 * (terminal.rows() - 1)), line);
+    }
+}
+
 static void run(Arguments opt) {
     const double start = milliseconds();
     prepare_folder(opt);
@@ -630,6 +707,7 @@ static void run(Arguments opt) {
     frame(opt, scene);
     leave_out(opt, scene);
     load_textures(opt, scene);
+    if (opt.view) return view(opt, scene);
     const double loaded = milliseconds();
     const bool moves = opt.move != Arguments::Move::nothing;
     const Arguments at_rest = opt;

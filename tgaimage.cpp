@@ -16,8 +16,11 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#if __has_include(<sys/ioctl.h>)
+#if __has_include(<termios.h>)
+#include <csignal>
+#include <poll.h>
 #include <sys/ioctl.h>
+#include <termios.h>
 #endif
 #if __has_include(<sys/mman.h>)
 #include <sys/mman.h>
@@ -325,35 +328,107 @@ void TGAImage::write_tga_file(const fs::path& path, bool rle) const {
     file.commit();
 }
 
-void TGAImage::print() const {
-    const char* const wide = std::getenv("COLUMNS");
-    int columns = wide ? std::atoi(wide) : 0;
+static std::pair<int, int> terminal_size() {  // columns and rows, 0 where there is none
 #ifdef TIOCGWINSZ
-    if (winsize size{}; ioctl(1, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) columns = size.ws_col;
+    if (winsize size{}; ioctl(1, TIOCGWINSZ, &size) == 0) return {size.ws_col, size.ws_row};
 #endif
-    const int w = std::min(columns > 0 ? columns : 80, w_);
-    const int h = std::max(1, w * h_ / w_);
-    const auto average = [&](int x, int y) {  // ";RED;GREEN;BLUE" of the pixels that come together there
+    return {0, 0};
+}
+
+std::string TGAImage::half_blocks(int columns) const {
+    const int w = std::min(columns, w_), h = std::max(1, w * h_ / w_);
+    const auto average = [&](int x, int y) {  // 0xRRGGBB of the pixels that come together there
         const int left = x * w_ / w, right = (x + 1) * w_ / w;
         const int low = y * h_ / h, high = (y + 1) * h_ / h;
-        std::string text;
+        int rgb = 0;
         for (const int c : {2, 1, 0}) {
             long long sum = 0;
             for (int i = low; i < high; i++)
                 for (int j = left; j < right; j++) sum += pixel(j, i)[bpp_ == 1 ? 0 : c];
-            text += ';' + std::to_string(sum / ((right - left) * (high - low)));
+            rgb = rgb * 256 + static_cast<int>(sum / ((right - left) * (high - low)));
         }
-        return text + 'm';
+        return rgb;
+    };
+    std::string text;
+    const auto set_color = [&text](int& now, int rgb, const char* what) {
+        if (rgb == now) return;
+        char code[32];
+        std::snprintf(code, sizeof code, "\033[%s;2;%d;%d;%dm", what, rgb >> 16, rgb >> 8 & 255, rgb & 255);
+        text += code, now = rgb;
     };
     for (int y = h - 1; y >= 0; y -= 2) {
-        std::string line;
+        int front = -1, back = -1;
         for (int x = 0; x < w; x++) {
-            line += "\033[38;2" + average(x, y);
-            if (y > 0) line += "\033[48;2" + average(x, y - 1);
-            line += "\u2580";  // the upper half of a block, over the background's colour
+            set_color(front, average(x, y), "38");
+            if (y > 0) set_color(back, average(x, y - 1), "48");
+            text += "\u2580";  // the upper half of a block, over the background's colour
         }
-        std::puts((line + "\033[0m").c_str());
+        text += "\033[0m\n";
     }
+    return text;
+}
+
+void TGAImage::print() const {
+    const char* const wide = std::getenv("COLUMNS");
+    int columns = wide ? std::atoi(wide) : 0;
+    if (const int own = terminal_size().first; own > 0) columns = own;
+    std::fputs(half_blocks(columns > 0 ? columns : 80).c_str(), stdout);
+}
+
+#if __has_include(<termios.h>)
+static termios before;  // how the terminal was: here, for the handler of a signal
+
+// What a handler may call: no more than that.
+static void restore() {
+    constexpr char show_cursor_and_old_screen[] = "\033[0m\033[?25h\033[?1049l";
+    [[maybe_unused]] const auto written = ::write(1, show_cursor_and_old_screen, sizeof show_cursor_and_old_screen - 1);
+    tcsetattr(0, TCSANOW, &before);
+}
+
+Terminal::Terminal() {
+    if (!isatty(1) || tcgetattr(0, &before)) throw std::runtime_error("standard input and output are no terminal");
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT})
+        std::signal(number, [](int n) {
+            restore();
+            std::signal(n, SIG_DFL);
+            std::raise(n);
+        });
+    std::signal(SIGWINCH, [](int) {});  // wakes key()
+    termios raw = before;
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    raw.c_cc[VSUSP] = _POSIX_VDISABLE;  // nothing would restore it
+    tcsetattr(0, TCSANOW, &raw);
+    std::fputs("\033[?1049h\033[?25l", stdout);  // a screen of its own, no cursor
+}
+
+Terminal::~Terminal() {
+    std::fflush(stdout);
+    restore();
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGWINCH}) std::signal(number, SIG_DFL);
+}
+
+char Terminal::key(int milliseconds) const {
+    pollfd input{0, POLLIN, 0};
+    if (poll(&input, 1, milliseconds) <= 0) return 0;
+    char bytes[3] = {};
+    if (::read(0, bytes, 1) <= 0) return 'q';
+    if (bytes[0] != '\033') return bytes[0];
+    if (poll(&input, 1, 0) <= 0 || ::read(0, bytes + 1, 2) < 2 || bytes[2] < 'A' || bytes[2] > 'D') return 0;
+    return "^v><"[bytes[2] - 'A'];
+}
+#else
+Terminal::Terminal() { throw std::runtime_error("a terminal can be drawn on with POSIX alone"); }
+Terminal::~Terminal() = default;
+char Terminal::key(int) const { return 'q'; }
+#endif
+
+int Terminal::columns() const { return std::max(1, terminal_size().first); }
+int Terminal::rows() const { return std::max(2, terminal_size().second); }
+
+void Terminal::show(const TGAImage& picture, std::string line) const {
+    line.resize(std::min<std::size_t>(line.size(), columns()));
+    std::fputs(("\033[H" + picture.half_blocks(columns()) + line + "\033[K").c_str(), stdout);
+    std::fflush(stdout);
 }
 
 TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(path) {

@@ -52,8 +52,9 @@ public:
     // Makes it a file at PATH, see TGAFile.
     void write_tga_file(const std::filesystem::path& path, bool rle = true) const;
 
-    // Prints it on standard output, averaged down to the terminal's width, in blocks of 24-bit colours: a character is
-    // two pixels, one above the other. The width is the terminal's own, or COLUMNS, or 80.
+    // For a terminal of so many columns, averaged down to them, in blocks of 24-bit colours: a character is two pixels,
+    // one above the other. print() puts it on standard output: the terminal's own columns, or COLUMNS, or 80.
+    std::string half_blocks(int columns) const;
     void print() const;
 
     int width() const { return w_; }
@@ -86,6 +87,23 @@ private:
 
     int w_ = 0, h_ = 0, bpp_ = 0;
     std::vector<std::uint8_t> data_;  // rows from the bottom up, and 3 bytes more: four can be read at every pixel
+};
+
+// The terminal as a window that shows pictures and takes keys: standard input and output, of POSIX systems. It is as it
+// was before when this ends, and when a signal ends the program.
+class Terminal {
+public:
+    Terminal();  // throws std::runtime_error where there is none
+    ~Terminal();
+    Terminal(const Terminal&) = delete;
+
+    int columns() const;
+    int rows() const;
+    void show(const TGAImage& picture, std::string line) const;  // at the upper left, and the line below it
+
+    // The next key: its character, or ^ v < > for an arrow. 0 if none is pressed for so many milliseconds (for ever: -1)
+    // or the window has changed; q where no more can come.
+    char key(int milliseconds) const;
 };
 
 // A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. It is made in memory
