@@ -179,31 +179,6 @@ struct PhongShader final : IShader {
     }
 };
 
-// The sky: behind everything and infinitely far off. No light falls on it, and it throws no shadow.
-struct SkyShader final : IShader {
-    mat4 uniform_PM;           // Projection*ModelView, so scaled that w does not vanish for an eye far off
-    const Material* material;
-    vec2 varying_uv[3];
-
-    SkyShader(const Model& m, const Camera& camera) : IShader(m), uniform_PM(camera.to_clip()) {
-        for (int i = 0; i < 4; i++) uniform_PM[i] = uniform_PM[i] / -camera.Projection[3].z;
-    }
-
-    vec4 vertex(int vert) const override {
-        vec4 p = uniform_PM * direction(normalized(model.vert(vert)));  // where the eye is does not count
-        p.z = -1e20 * p.w;
-        return p;
-    }
-    void varying(int iface, int nthvert) override {
-        material = &model.material(iface);
-        varying_uv[nthvert] = model.uv(iface, nthvert);
-    }
-    Color fragment(const Fragment& f) const override {
-        if (!material->diffuse) return bgr(material->Kd * 255);
-        return Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr();
-    }
-};
-
 // ---- the two passes ----
 
 static Camera viewer(const Options& opt) {

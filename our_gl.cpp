@@ -237,6 +237,26 @@ TGAImage depth_picture(const DepthBuffer& depths, double aspect) {
     return picture;
 }
 
+SkyShader::SkyShader(const Model& m, const Camera& camera) : IShader(m), uniform_PM(camera.to_clip()) {
+    for (int i = 0; i < 4; i++) uniform_PM[i] = uniform_PM[i] / -camera.Projection[3].z;
+}
+
+vec4 SkyShader::vertex(int vert) const {
+    vec4 p = uniform_PM * direction(normalized(model.vert(vert)));  // where the eye is does not count
+    p.z = -1e20 * p.w;  // behind all that a scene of less than 1e17 units could hold: screen_depth is for two units
+    return p;
+}
+
+void SkyShader::varying(int iface, int nthvert) {
+    material = &model.material(iface);
+    varying_uv[nthvert] = model.uv(iface, nthvert);
+}
+
+Color SkyShader::fragment(const Fragment& f) const {
+    if (!material->diffuse) return bgr(material->Kd * 255);
+    return Texels(material->diffuse, interpolated(varying_uv, f.bar)).bgr();
+}
+
 vec<2, coord> moved(const Map& map, const UV& uv) {
     return UV({uv.given.x * map.scale.x + map.offset.x, uv.given.y * map.scale.y + map.offset.y}).wrapped;
 }

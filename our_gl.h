@@ -220,6 +220,18 @@ INLINED real power(real base, const real& exponent) {
     return result;
 }
 
+// The sky: behind everything and infinitely far off. No light falls on it, and it throws no shadow.
+struct SkyShader final : IShader {
+    mat4 uniform_PM;           // Projection*ModelView, so scaled that w does not vanish for an eye far off
+    const Material* material;  // the face's
+    vec2 varying_uv[3];
+
+    SkyShader(const Model& m, const Camera& camera);
+    vec4 vertex(int vert) const override;
+    void varying(int iface, int nthvert) override;
+    Color fragment(const Fragment& f) const override;
+};
+
 // ---- drawing ----
 
 // What a pass did, and what it left out. The same at any number of threads.
