@@ -71,7 +71,7 @@ std::vector<Corners> read_faces(Input& in, int vertices, bool many) {
     for (Corners& f : few)
         for (int& i : f.index) i = in.upto(static_cast<unsigned>(vertices));
     if (!many) return few;
-    std::vector<Corners> faces(3 * 256);  // what three threads take
+    std::vector<Corners> faces(3 * 64);  // what three threads take
     for (std::size_t i = 0; i < faces.size(); i++)
         for (std::size_t c = 0; c < 3; c++)
             faces[i].index[c] = (few[i % few.size()].index[c] + static_cast<int>(i / few.size() * c)) % vertices;
