@@ -2,7 +2,7 @@
 // renderer and not of the default build; its output is committed. The bytes are the same from every compiler, at any
 // number of threads.
 //
-//     make_models FOLDER    writes FOLDER/idol, FOLDER/floor, FOLDER/knot
+//     make_models FOLDER    writes FOLDER/idol, FOLDER/floor and so on
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -22,10 +22,13 @@ void write(const std::filesystem::path& folder, const std::string& name, const s
         std::snprintf(line, sizeof line, format, numbers...);
         text += line;
     };
-    for (const vec3& v : t.mesh.verts) {
+    for (int i = 0; i < t.mesh.nverts(); i++) {
+        const vec3& v = t.mesh.verts[i];
         for (int k = 0; k < 3; k++)
             if (!(std::fabs(v[k]) <= 1)) throw std::runtime_error(path.string() + ": a vertex outside [-1,1]^3");
-        add("v %.5f %.5f %.5f\n", v.x, v.y, v.z);
+        add("v %.5f %.5f %.5f", v.x, v.y, v.z);
+        if (!t.colors.empty()) add(" %.2f %.2f %.2f", t.colors[i].x, t.colors[i].y, t.colors[i].z);
+        text += "\n";
     }
     for (const vec2& v : t.uvs) add("vt %.5f %.5f\n", v.x, v.y);
     for (const vec3& v : t.normals) add("vn %.4f %.4f %.4f\n", v.x, v.y, v.z);
@@ -68,6 +71,7 @@ int main(int argc, char** argv) try {
     write(argv[1], "floor", "The floor: a slab of flagstones", slab, bake_floor(512));
     write(argv[1], "sky", "The sky: a dome above the clouds", sky_dome(), bake_sky(1024, 512));
     write(argv[1], "knot", "The knot: a tube along the torus knot (2,3)", tube, {});
+    write(argv[1], "fences", "The fences: four of them, on a field", fences(), {});
 } catch (const std::exception& error) {
     std::fprintf(stderr, "make_models: %s\n", error.what());
     return 1;

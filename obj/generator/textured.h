@@ -8,6 +8,7 @@ using Corners = std::array<vec2, 3>;  // of a triangle in the texture
 struct Textured {  // a mesh as the renderer will read it back, rounded to the decimals that the file has
     Mesh mesh;
     std::vector<vec3> normals;
+    std::vector<vec3> colors;  // of the vertices, red first, in [0,1]; or none
     std::vector<vec2> uvs;
     std::vector<Face> uv_of, normal_of;  // indices, three a face
 
@@ -30,6 +31,7 @@ Maps bake_idol(const Textured& t, int size);
 Textured floor_slab();
 Maps bake_floor(int size);
 Textured knot();
+Textured fences();
 Textured sky_dome();
 Maps bake_sky(int width, int height);
 

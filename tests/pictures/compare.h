@@ -35,8 +35,8 @@ struct References {
 // tests/reference, failed/ in the current folder, and whether the environment has UMBRA_UPDATE_REFERENCES=1.
 References default_references();
 
-// Why the picture is not its reference, in one line; empty where it is, exactly, and where besides, if the README shows
-// it, NAME.png is its PNG file byte for byte. Where it is not, or a file is missing, unreadable or of another size, the
-// picture is written to NAME.tga in the folder of failed ones, with NAME.diff.tga where the sizes agree.
-std::string not_reference(const TGAImage& picture, const std::string& name, bool in_readme = false,
+// Why the picture is not its reference, in one line; empty where it is, exactly. Where it is not, or a file is missing,
+// unreadable or of another size, the picture is written to NAME.tga in the folder of failed ones, with NAME.diff.tga
+// where the sizes agree.
+std::string not_reference(const TGAImage& picture, const std::string& name,
                           const References& references = default_references());

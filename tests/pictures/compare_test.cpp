@@ -57,40 +57,35 @@ TEST("the difference picture shows eight times the difference") {
 TEST("a picture passes where it is its reference, and else it is said why not") {
     const TemporaryFolder folder("compare_test");
     const fs::path seen = folder / "failed/name.tga", differing = folder / "failed/name.diff.tga";
-    const fs::path file = folder / "new/name.tga", png = folder / "new/name.png";
-    const auto check = [&](const TGAImage& picture, bool in_readme, const std::string& begin) {
-        const std::string why = not_reference(picture, "name", in_readme, {folder / "new", folder / "failed", false});
+    const fs::path file = folder / "new/name.tga";
+    const auto check = [&](const TGAImage& picture, const std::string& begin) {
+        const std::string why = not_reference(picture, "name", {folder / "new", folder / "failed", false});
         CHECK_EQ(why.substr(0, begin.size()), begin);
         CHECK(why.empty() == begin.empty() && fs::exists(seen) == !begin.empty());
         if (fs::exists(seen)) CHECK(compare(TGAImage::read_tga_file(seen), picture).same());
     };
-    const auto update = [&](const TGAImage& picture, bool in_readme) {
-        CHECK_EQ(not_reference(picture, "name", in_readme, {folder / "new", folder / "failed", true}), "");
+    const auto update = [&](const TGAImage& picture) {
+        CHECK_EQ(not_reference(picture, "name", {folder / "new", folder / "failed", true}), "");
         fs::remove_all(folder / "failed");
     };
-    check(reference, false, "no reference: " + file.string() + ": cannot be opened: ");
+    check(reference, "no reference: " + file.string() + ": cannot be opened: ");
     CHECK(!fs::exists(file) && !fs::exists(differing));  // none was made
 
-    update(reference, false);
-    check(reference, false, "");
-    check(reference, true, "no reference: " + png.string() + ": cannot open");  // the README's is missing
+    update(reference);
+    check(reference, "");
 
     const TGAImage wrong = changed(reference, 49, 39, 2, 1);
-    check(wrong, false, "1 of 2000 pixels differ, by 1 at most, at 49,39; see " + seen.string());
+    check(wrong, "1 of 2000 pixels differ, by 1 at most, at 49,39; see " + seen.string());
     CHECK(compare(TGAImage::read_tga_file(differing), difference_picture(wrong, reference)).same());
     CHECK(compare(TGAImage::read_tga_file(file), reference).same());  // it is as it was
-    check(checkered(51, 40, TGAImage::RGB), false, "51 x 40 x 3 where the reference is 50 x 40 x 3");
+    check(checkered(51, 40, TGAImage::RGB), "51 x 40 x 3 where the reference is 50 x 40 x 3");
     CHECK(!fs::exists(differing));  // the one before would mislead
-    check(checkered(50, 40, TGAImage::RGBA), false, "50 x 40 x 4 where the reference is 50 x 40 x 3");
+    check(checkered(50, 40, TGAImage::RGBA), "50 x 40 x 4 where the reference is 50 x 40 x 3");
 
-    update(reference, true);
-    check(reference, true, "");
-    write_bytes(png, png_file(wrong));
-    check(reference, true, png.string() + " is not this picture");
-    update(wrong, true);
-    check(wrong, true, "");
+    update(wrong);
+    check(wrong, "");
     write_bytes(file, {1, 2, 3});
-    check(reference, false, "no reference: " + file.string() + ": byte 3: the header is truncated");
+    check(reference, "no reference: " + file.string() + ": byte 3: the header is truncated");
 }
 
 TEST("the command says how pictures differ, and its status whether") {

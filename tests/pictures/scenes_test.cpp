@@ -1,6 +1,6 @@
-// scenes_test.cpp: many small pictures, each of one feature, and the default render; every one must be its reference in
-// tests/reference. Geometry and command line stand together: `scenes_test NAME` runs one scene, and the target
-// update_references makes all references anew. It knows nothing of what is right but that a person looked at them.
+// scenes_test.cpp: many small pictures, each of one feature; every one must be its reference in tests/reference.
+// Geometry and command line stand together: `scenes_test NAME` runs one scene, and the target update_references makes
+// all references anew. It knows nothing of what is right but that a person looked at them.
 #include "compare.h"
 #include "run.h"
 #include "scenes.h"
@@ -117,12 +117,7 @@ private:
     int vertices_ = 0, uvs_ = 0, normals_ = 0;
 };
 
-// A picture that the README shows has a PNG file beside its reference.
-void check(const TGAImage& picture, const std::string& name) {
-    const Bytes readme = read_bytes(fs::path(UMBRA_REFERENCE_DIR) / "../../README.md");
-    const std::string text(readme.begin(), readme.end());
-    CHECK_EQ(not_reference(picture, name, text.find("(tests/reference/" + name + ".png)") != text.npos), "");
-}
+void check(const TGAImage& picture, const std::string& name) { CHECK_EQ(not_reference(picture, name), ""); }
 
 // A scene is a function that adds the models; what is drawn with the arguments must be the reference of the same name.
 #define SCENE(name, ...)             \
@@ -423,16 +418,6 @@ PICTURE(coarse_map, add_yard, "--size 128x128 --shadow-size 24 --no-fit --eye 1,
 // The same without a shadow buffer: exact.
 PICTURE(exact_shadow, add_yard, "--size 128x128 --shadow exact --no-fit --eye 1,1.8,5 --light 1,1,.6")
 
-// Four fences, each twice as high as the one before it. Each throws a shadow twice as long as it is high ...
-SCENE(fences, "--size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0") {
-    s.quad("white", {-1, 0, .8}, {1, 0, .8}, {1, 0, -.8}, {-1, 0, -.8});
-    constexpr double x[] = {-.85, -.55, -.1, .75}, height[] = {.015, .03, .06, .12};
-    for (int i = 0; i < 4; i++) s.box("green", {x[i], 0, -.7}, {x[i] + .015, height[i], .7});
-}
-
-// ... but with the lesson's constant as the bias the lowest one does not, and the others not at their foot.
-PICTURE(fences_lesson_bias, fences, "--size 480x320 --shadow-size 1024 --bias 43.34 --eye -.3,1.6,1.6 --light 2,1,0")
-
 // A spot light whose beam ends on the floor, round and square; a point light between the things, one of which is behind
 // it as it looks at the center.
 PICTURE(spot_round, add_yard, "--size 128x128 --shadow-size 512 --no-fit --eye 1,1.8,5 --spot 2,3,1.5,14")
@@ -478,21 +463,7 @@ SCENE(glow_in_shadow, "--size 128x128 --shadow-size 512 --no-fit --eye .3,3,3 --
     s.box("blue", {.9, -.6, -.9}, {1, .3, .9});
 }
 
-// ---- the default render, and that wrong pictures are noticed ----
-
-// The idol at 800 x 800, and what the light sees of it.
-TEST("default render") {
-    const Scene idol([](Scene&) {});
-    check(idol.draw(""), "framebuffer");
-    check(TGAImage::read_tga_file(idol / "depth.tga"), "depth");
-}
-
-TEST("idol, floor and sky, under a spot light") {
-    const Scene idol([](Scene&) {});
-    const std::string obj = UMBRA_OBJ_DIR;
-    check(idol.draw("--no-fit --size 400 --spot 2,3,2.5,16 --sky " + obj + "/sky/sky.obj " + obj + "/idol/idol.obj " +
-                    obj + "/floor/floor.obj"), "spot_under_sky");
-}
+// ---- that wrong pictures are noticed ----
 
 // The idol on its floor under the sky, and every kind of light: beside it, behind it, in its midst; beams that end on its
 // nose and beams that pass the picture on all sides; and one low above the floor, half of which is behind the light.
