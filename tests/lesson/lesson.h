@@ -15,12 +15,12 @@
 namespace fs = std::filesystem;
 
 struct Passage {
-    enum Kind { quote, exercise, fence, command, image } kind;
+    enum Kind { quote, exercise, output, fence, command, image } kind;
     int line;                  // of the README, from 1 on
     std::string text;          // the file quoted, a fence's first line, the command, the image's file
-    int program = 0;           // umbra itself, or that of the exercise of this number
+    int program = 0;           // umbra itself, or that of the exercise of this number, if its section has one
     Strings body = {};         // a fence's lines
-    std::string made_by = {};  // an image's command
+    std::string made_by = {};  // an image's command, or an output's
     int to_one = 1;            // so many pixels a side of the picture are one of the image
 };
 
@@ -43,6 +43,7 @@ inline std::string text_of(const fs::path& file) {  // of the repository
 inline std::vector<Passage> parsed(const std::string& readme) {
     std::vector<Passage> all;
     int n = 0, fence = 0, program = 0, exercises = 0;  // fence: its first line, 0 outside of one ...
+    std::size_t section = 0;                           // its first passage
     std::string before, last, begun, info;             // ... and what that says; begun: a command that goes on
     Strings body, header;                              // of a table: each column's command
     const auto add_command = [&](const std::string& text) {
@@ -61,9 +62,11 @@ inline std::vector<Passage> parsed(const std::string& readme) {
         if (line.starts_with("```") && !fence) {
             fence = n, info = line.substr(3), body.clear();
             if (info == "diff main.cpp") program = ++exercises;
+            if (info == "diff main.cpp") for (std::size_t i = section; i < all.size(); i++) all[i].program = program;
         } else if (line.starts_with("```")) {
             if (info.starts_with("cpp ")) all.push_back({Passage::quote, fence, info.substr(4), program, body});
             else if (info == "diff main.cpp") all.push_back({Passage::exercise, fence, info, program, body});
+            else if (info == "output") all.push_back({Passage::output, fence, info, program, body, last});
             else all.push_back({Passage::fence, fence, info, program});
             fence = 0;
         } else if (fence) {
@@ -84,7 +87,7 @@ inline std::vector<Passage> parsed(const std::string& readme) {
             add_command(line);
         } else {
             add_images(line, last);
-            if (line.find("</details>") != line.npos) program = 0;
+            if (line.starts_with("#")) program = 0, section = all.size();
         }
         before = line;
     }
@@ -151,6 +154,7 @@ public:
         fs::create_directories(*this / "build/tests");
         link(UMBRA_OBJ_DIR, "obj");
         link(UMBRA_REPORT, "build/tests/report");
+        link(UMBRA_WALK, "build/tests/walk");
         fs::current_path(path());
     }
     ~Desk() { fs::current_path(home_); }
@@ -193,13 +197,23 @@ inline Desk& desk() {
 inline PictureError error(const std::string& command, int program = 0) {
     Strings arguments = split(command, ' ');
     arguments.erase(arguments.begin());  // build/umbra
+    std::erase(arguments, "");
     const Program umbra(desk().programs.at(program));
     return Judge(umbra, arguments).error();
 }
 
-inline double pixels_that_differ(const Run& a, const Run& b) {
-    const Difference d = compare(a.framebuffer, b.framebuffer);
-    return d.same_size ? static_cast<double>(d.pixels_differ) : throw std::invalid_argument(in_words(d));
+// In how many pixels two runs differ by more than so many of 255 in a channel.
+inline double pixels_that_differ(const Run& a, const Run& b, int by = 0) {
+    const TGAImage &p = a.framebuffer, &q = b.framebuffer;
+    if (p.width() != q.width() || p.height() != q.height()) throw std::invalid_argument("two sizes");
+    int n = 0;
+    for (int y = 0; y < p.height(); y++)
+        for (int x = 0; x < p.width(); x++) {
+            int most = 0;
+            for (int c = 0; c < 3; c++) most = std::max(most, std::abs(p.pixel(x, y)[c] - q.pixel(x, y)[c]));
+            n += most > by;
+        }
+    return n;
 }
 
 // n x n pixels to one: their mean, a half rounded up.
@@ -228,7 +242,8 @@ inline void check_command(const Passage& p) {
         std::printf("skipped: %s\n", p.text.c_str());
         return;
     }
-    if (first != "build/umbra" && first != "build/tests/report" && first != "seq")
+    const Strings known{"build/umbra", "build/tests/report", "build/tests/walk", "printf", "seq"};
+    if (std::find(known.begin(), known.end(), first) == known.end())
         throw Wrong(p.line, "neither run nor known to be left out: " + p.text);
     const Outcome& said = desk().run(p.text, p.program).said;
     if (said.status != 0) throw Wrong(p.line, p.text + ": status " + std::to_string(said.status) + ": " + said.err);
@@ -266,6 +281,8 @@ inline Strings wrong(const std::vector<Passage>& passages, bool of_exercises, co
             throw Wrong(p.line, "a fence of an unknown kind: " + p.text);
         if ((p.program > 0) != of_exercises || !desk().programs.count(p.program)) continue;
         if (p.kind == Passage::command) check_command(p);
+        if (p.kind == Passage::output && split(desk().run(p.made_by, p.program).said.out, '\n') != p.body)
+            throw Wrong(p.line, "is not what is printed by " + p.made_by);
         if (p.kind == Passage::image) check_image(p, references);
     } catch (const std::exception& e) {
         all.push_back(e.what());
@@ -329,19 +346,14 @@ inline Strings wrong_figures(const std::string& readme, const std::vector<Figure
     return all;
 }
 
-// The rows of the table whose header begins so, in the README or else in a text of tests/.
-inline Strings table(const std::string& header) {
-    std::vector<fs::path> files{"README.md"};
-    for (const auto& entry : fs::recursive_directory_iterator(UMBRA_SOURCE_DIR "/tests"))
-        if (entry.path().extension() == ".md") files.push_back(entry.path());
-    for (const fs::path& file : files) {
-        Strings rows;
-        for (const std::string& line : split(text_of(file), '\n'))
-            if (line.starts_with(header) || (!rows.empty() && line.starts_with("|"))) rows.push_back(line);
-            else if (!rows.empty()) break;
-        if (rows.size() > 2) return {rows.begin() + 2, rows.end()};
-    }
-    throw std::runtime_error("no table begins with " + header);
+// The rows of a text's table whose header begins so.
+inline Strings table(const std::string& file, const std::string& header) {
+    Strings rows;
+    for (const std::string& line : split(text_of(file), '\n'))
+        if (line.starts_with(header) || (!rows.empty() && line.starts_with("|"))) rows.push_back(line);
+        else if (!rows.empty()) break;
+    if (rows.size() > 2) return {rows.begin() + 2, rows.end()};
+    throw std::runtime_error("no table of " + file + " begins with " + header);
 }
 
 // The rows of a file of tests/reference, without its header.

@@ -2,6 +2,7 @@
 // compiles the exercises. The target update_references draws the README's pictures anew.
 #include "lesson.h"
 
+#include <numbers>
 #include <set>
 
 namespace {
@@ -24,12 +25,47 @@ std::vector<Figures> sentences() {
     const double vertices = Model(UMBRA_OBJ_DIR "/idol/idol.obj").nverts();
     const std::vector<Strings> rows = csv("report.csv");
     const Strings bias = rows.at(8);  // with a buffer of 800
-    double off_theory = 0;  // in percent of what it predicts for --shadow map
-    for (int i = 0; i < 6; i++)
-        off_theory = std::max(off_theory, std::fabs(stod(rows[i][16]) / stod(rows[i][15]) - 1) * 100);
     const std::string fences = " --size 480x320 --shadow-size 1024 --eye -.3,1.6,1.6 --light 2,1,0"
                                " obj/fences/fences.obj";
+    const std::string umbra = "build/umbra ", idol = " obj/idol/idol.obj", knot = " obj/knot/knot.obj";
+    const std::string floor = umbra + "--size 400 obj/floor/floor.obj --light ";
+    const auto dark = [&](const std::string& command) {
+        const PictureError e = error(umbra + command);
+        return e.percent(e.falsely_dark);
+    };
+    const auto lit = [&](const std::string& command) {
+        const PictureError e = error(umbra + command);
+        return e.percent(e.falsely_lit);
+    };
+    const double distance = std::sqrt(18.), nearer = 1 / (1 - 1 / distance), diagonal = std::sqrt(2.) * 2 / 600;
+    const double tangent = pixels_that_differ(desk().run("build/umbra"), desk().run("build/umbra --tangent"), 8);
+    const double steep = std::atan(.04334 / diagonal) * 180 / std::numbers::pi;
     return {
+        {"Of the pixels that face the light {.1} % are lit here", {lit("--size 400 --shadow off")}},
+        {"4.24 away, what is one unit nearer grows by 1 / (1 - 1/{.2}) = {.2}; three quarters of the picture times "
+         "{.2} is {.2} of it", {distance, nearer, nearer, .75 * nearer}},
+        {"At 800 x 800, {.1} % of what faces the light is falsely dark", {dark("--bias 0")}},
+        {"the diagonal of a texel is {.4} units long. A surface that rises by .04334 over that length is {} degrees "
+         "steep", {diagonal, steep}},
+        {"under the chin and along the collar: {.2} % falsely lit", {lit("--bias 43.34")}},
+        {"On the bust {.2} % is falsely dark and {.2} % falsely lit now", {dark(""), lit("")}},
+        {"{.2} % falsely dark instead of {.1} %, without any bias",
+         {dark("--bias 0 --casters back"), dark("--bias 0")}},
+        {"leak where their front and back lie in one texel: {.2} % are falsely lit", {lit("--bias 0 --casters back")}},
+        {"takes {.1} ms for the two passes of the idol", {stod(csv("bench.csv").at(6)[3])}},
+        {"derives the bias instead ({.2} % and {.2} %)", {error(umbra + knot).percent(), error(umbra).percent()}},
+        {"off by more than 8 of 255 at {} of {} pixels ({.1} %)",
+         {tangent, said("pixels"), 100 * tangent / said("pixels")}},
+        {"On the idol {.2} % of what faces the light is falsely lit at 43.34, and {.2} % at 200",
+         {lit("--bias 43.34"), lit("--bias 200")}},
+        {"at 6400 a side it is still {.2} %", {stod(rows.at(11)[3])}},
+        {"At 43.34 this light leaves {} % of the floor falsely dark; 200 cures it, and fails under `--light 1,.01,0` "
+         "({} %)", {error(floor + "1,.02,0 --bias 43.34").percent(), error(floor + "1,.01,0 --bias 200").percent()}},
+        {"From 43.34 to 200 the knot goes from {.2} to {.2} % falsely lit",
+         {lit("--bias 43.34" + knot), lit("--bias 200" + knot)}},
+        {"On the idol `--bias 0` makes {.1} % of what faces the light falsely dark, `--bias 0 --casters back` {.2} %. "
+         "But now {.2} % are falsely lit",
+         {dark("--bias 0"), dark("--bias 0 --casters back"), lit("--bias 0 --casters back")}},
         {"the idol's {} in the default view", {said("pixels")}},
         {"leaves out {} of {} calls of `fragment`", {hidden, covered}},
         {"others: {} of {}; {} vertices placed, not {} corners", {hidden, covered, vertices, 3 * triangles}},
@@ -37,16 +73,14 @@ std::vector<Figures> sentences() {
         {"the light's pass and its buffer of {.2} MB", {said("shadow_bytes") / 1e6}},
         {"is the bust above: {} triangles", {triangles}},
         {"{.2} % of what faces the light is falsely lit, {.2} % falsely dark", {stod(bias[3]), stod(bias[2])}},
-        {"the error is {.4} times the texel's side", {stod(rows[0][12])}},
-        {"the report finds that within {} % at every size", {std::ceil(off_theory)}},
-        {"`map` gets {.2} % of the pixels wrong, `--bias 43.34` {.1} %",
+        {"Of the pixels that face the light {.2} % are wrong on the left and {.1} % on the right",
          {error("build/umbra" + fences).percent(), error("build/umbra --bias 43.34" + fences).percent()}},
     };
 }
 
 // The rows of the table whose header begins so must end so, one after the other.
 void check_rows(const std::string& header, const Strings& ends) {
-    const Strings rows = table(header);
+    const Strings rows = table("tests/README.md", header);
     CHECK_EQ(rows.size(), ends.size());
     for (std::size_t i = 0; i < std::min(rows.size(), ends.size()); i++)
         CHECK_EQ(rows[i].substr(rows[i].size() - std::min(rows[i].size(), ends[i].size())), ends[i]);
@@ -74,7 +108,16 @@ TEST("README: every PNG file of tests/reference is shown") {
             report({"README.md does not show " + entry.path().string()});
 }
 
-TEST("README: figures in sentences") { report(wrong_figures(readme, sentences())); }
+TEST("README: figures in sentences") {
+    report(wrong_figures(readme, sentences()));
+    double off_theory = 0;  // in percent of what it predicts for --shadow map
+    const std::vector<Strings> rows = csv("report.csv");
+    for (int i = 0; i < 6; i++)
+        off_theory = std::max(off_theory, std::fabs(stod(rows[i][16]) / stod(rows[i][15]) - 1) * 100);
+    report(wrong_figures(text_of("tests/README.md"), {
+        {"theory says the error is {.4} times the texel's side", {stod(rows[0][12])}},
+        {"the report finds that within {} % at every size", {std::ceil(off_theory)}}}));
+}
 
 TEST("README: the table of report.csv") {
     const std::map<std::string, std::string> names{
@@ -89,6 +132,22 @@ TEST("README: the table of report.csv") {
                                " | {0.3} | {0.3} | {0.3} | {0.2} | {0.1} | {0.1} | {0.2} |", values}));
     }
     check_rows("| method | buffer |", rows);
+    for (const std::string& row : table("README.md", "| method | buffer |"))  // some of them
+        if (!CHECK(std::count(rows.begin(), rows.end(), row) == 1)) std::cerr << "    " << row << '\n';
+}
+
+TEST("README: the table of lights.csv") {
+    Strings rows;
+    for (const Strings& r : csv("lights.csv")) {
+        std::vector<double> values;
+        for (const int i : {2, 3, 4, 5, 6, 7}) values.push_back(stod(r[i]));
+        values.push_back(stod(r[9]) / 1e6);
+        const Strings light = split(r[0].substr(0, r[0].find(',')), ' ');
+        const std::string how = r[1].empty() ? "`exact` | -" : "`map` | " + r[1];
+        rows.push_back(filled({"| `--" + light[0] + "`, " + light[1] + " | " + how +
+                               " | {0.3} | {0.3} | {0.3} | {0.2} | {0.1} | {0.1} | {0.2} |", values}));
+    }
+    check_rows("| light, half angle |", rows);
 }
 
 TEST("README: the table of bench.csv") {
@@ -190,8 +249,24 @@ TEST("README: an exercise whose hunks are not there once is reported") {
 TEST("exercises: they compile, and their commands, pictures and figures are right") {
     report(build(passages));
     report(wrong(passages, true, references));
-    const std::vector<Figures> sentences;  // as above; error(command, 2) and desk().run(command, 2) are of the second
-    report(wrong_figures(readme, sentences));
+    const auto rmse = [](const std::string& options, int program) {
+        return error("build/umbra " + options, program).rmse;
+    };
+    const auto percent = [](const std::string& options, int program = 0) {
+        const PictureError e = error("build/umbra " + options, program);
+        return e.percent(e.falsely_lit);
+    };
+    enum { umbra, own_bias, halo, soft_edges, second_light, closed_bodies };
+    const std::string sail = "--size 400 --light 1,1,.5 obj/idol/idol.obj build/sail.obj";
+    const std::string back = "--casters back " + sail;
+    report(wrong_figures(readme, {
+        {"40 leaves {.2} % wrong on the knot", {error("build/umbra obj/knot/knot.obj", own_bias).percent()}},
+        {"and 40 has {.2} %", {error("build/umbra", own_bias).percent()}},
+        {"from an RMSE of {.2} to {.2} with a buffer of 200, from {.2} to {.2} with one of 800",
+         {rmse("--shadow-size 200", umbra), rmse("--shadow-size 200", soft_edges), rmse("", umbra),
+          rmse("", soft_edges)}},
+        {"{.1} % of what faces the light is falsely lit, and {.2} % after the change; with all faces in the buffer it "
+         "is {.2} %", {percent(back), percent(back, closed_bodies), percent(sail)}}}));
 }
 #endif
 

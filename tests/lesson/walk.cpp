@@ -22,7 +22,8 @@ struct FindingShader final : IShader {
     };
     mat4 uniform_PM;
     Found& found;
-    FindingShader(const Model& m, const Camera& camera, Found& f) : IShader(m), uniform_PM(camera.to_clip()), found(f) {}
+    FindingShader(const Model& m, const Camera& camera, Found& f)
+        : IShader(m), uniform_PM(camera.to_clip()), found(f) {}
     vec4 vertex(int vert) const override { return uniform_PM * point(model.vert(vert)); }
     Color fragment(const Fragment& f) const override {
         for (int i = 0; i < lanes; i++)
@@ -48,7 +49,7 @@ int main(int argc, char** argv) try {
     const std::vector<Model> models(1, Model(UMBRA_OBJ_DIR "/idol/idol.obj"));
     const vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0}, to_light{1, 1, 0};
 
-    const Camera light = fitted({lookat(to_light, center, up), projection(0), middle_viewport(size, size)}, models, size);
+    const Camera light = fitted({lookat(to_light, center, up), projection(0), {}}, models, size);
     const mat4 M = light.to_screen();
     DepthBuffer shadowbuffer(size, size);
     draw(std::vector{DepthShader(models[0], light)}, light.Viewport, shadowbuffer);

@@ -56,7 +56,7 @@ std::vector<Figures> lights(const Program& umbra, const Strings& scene) {
             for (const std::string size : {"512", "1024", "2048", "4096", "exact"}) {
                 const Strings how = size == "exact" ? Strings{"--shadow", size} : Strings{"--shadow-size", size};
                 Figures& f = all.emplace_back();
-                f.method = kind + " " + place.substr(place.rfind(',') + 1) + (size == "exact" ? ", exact" : "");
+                f.method = kind + " " + place.substr(place.rfind(',') + 1) + (size == "exact" ? " exact" : "");
                 f.size = size == "exact" ? 0 : std::stoi(size), f.arguments = joined(light, how);
                 std::cerr << "report: errors of " << f.method << ' ' << size << '\n';
                 set_errors(f, judge.error(how));
