@@ -22,10 +22,12 @@ struct Passage {
     Strings body = {};         // a fence's lines
     std::string made_by = {};  // an image's command, or an output's
     int to_one = 1;            // so many pixels a side of the picture are one of the image
+    std::string file = {};     // where it stands
 };
 
 struct Wrong : std::runtime_error {
-    Wrong(int line, const std::string& what) : runtime_error("README.md:" + std::to_string(line) + ": " + what) {}
+    Wrong(const Passage& p, const std::string& what, int line = 0)
+        : runtime_error(p.file + ':' + std::to_string(line ? line : p.line) + ": " + what) {}
 };
 
 inline Strings split(const std::string& text, char at) {
@@ -40,9 +42,11 @@ inline std::string text_of(const fs::path& file) {  // of the repository
     return {bytes.begin(), bytes.end()};
 }
 
-inline std::vector<Passage> parsed(const std::string& readme) {
+// The passages of a text; its exercises are counted on from a number.
+inline std::vector<Passage> parsed(const std::string& markdown, const std::string& file = "README.md",
+                                   int exercises = 0) {
     std::vector<Passage> all;
-    int n = 0, fence = 0, program = 0, exercises = 0;  // fence: its first line, 0 outside of one ...
+    int n = 0, fence = 0, program = 0;                 // fence: its first line, 0 outside of one ...
     std::size_t section = 0;                           // its first passage
     std::string before, last, begun, info;             // ... and what that says; begun: a command that goes on
     Strings body, header;                              // of a table: each column's command
@@ -57,7 +61,7 @@ inline std::vector<Passage> parsed(const std::string& readme) {
             all.push_back({Passage::image, n, it->str(1), program, {}, made_by,
                            it->length(3) ? std::stoi(it->str(3)) : 1});
     };
-    for (const std::string& line : split(readme, '\n')) {
+    for (const std::string& line : split(markdown, '\n')) {
         n++;
         if (line.starts_with("```") && !fence) {
             fence = n, info = line.substr(3), body.clear();
@@ -91,6 +95,7 @@ inline std::vector<Passage> parsed(const std::string& readme) {
         }
         before = line;
     }
+    for (Passage& p : all) p.file = file;
     return all;
 }
 
@@ -131,9 +136,9 @@ inline std::string changed(const Passage& exercise, const std::string& source) {
         }
         const std::size_t at = text.find(was);
         if (at == text.npos || text.find(was, at + 1) != text.npos)
-            throw Wrong(hunk_line, "exercise " + std::to_string(exercise.program) + ", hunk " + std::to_string(hunk) +
+            throw Wrong(exercise, "exercise " + std::to_string(exercise.program) + ", hunk " + std::to_string(hunk) +
                         " stands in main.cpp " + (at == text.npos ? "nowhere" : "more than once") + ": " +
-                        was.substr(1, was.find('\n', 1) - 1));
+                        was.substr(1, was.find('\n', 1) - 1), hunk_line);
         text.replace(at, was.size(), is);
         was = is = "\n", hunk++, hunk_line = line + 1;
     }
@@ -244,28 +249,28 @@ inline void check_command(const Passage& p) {
     }
     const Strings known{"build/umbra", "build/tests/report", "build/tests/walk", "printf", "seq"};
     if (std::find(known.begin(), known.end(), first) == known.end())
-        throw Wrong(p.line, "neither run nor known to be left out: " + p.text);
+        throw Wrong(p, "neither run nor known to be left out: " + p.text);
     const Outcome& said = desk().run(p.text, p.program).said;
-    if (said.status != 0) throw Wrong(p.line, p.text + ": status " + std::to_string(said.status) + ": " + said.err);
+    if (said.status != 0) throw Wrong(p, p.text + ": status " + std::to_string(said.status) + ": " + said.err);
 }
 
 inline void check_image(const Passage& p, const References& references) {
     const std::string folder = "tests/reference/";
     if (!p.text.ends_with(".png") && fs::exists(UMBRA_SOURCE_DIR / fs::path(p.text))) return;
     if (!p.text.starts_with(folder) || !p.text.ends_with(".png"))
-        throw Wrong(p.line, p.text + " is not there, or not in " + folder);
-    if (!p.made_by.starts_with("build/umbra")) throw Wrong(p.line, "no command makes " + p.text);
+        throw Wrong(p, p.text + " is not there, or not in " + folder);
+    if (!p.made_by.starts_with("build/umbra")) throw Wrong(p, "no command makes " + p.text);
     const fs::path file = references.folder / p.text.substr(folder.size());
     const Run& run = desk().run(p.made_by, p.program);
     const bool is_depth = file.filename().string().find("depth") != std::string::npos;
     const TGAImage& picture = is_depth ? run.depth : run.framebuffer;
-    if (picture.empty()) throw Wrong(p.line, p.made_by + " draws no picture for " + p.text);
+    if (picture.empty()) throw Wrong(p, p.made_by + " draws no picture for " + p.text);
     const Bytes png = png_file(shrunk(picture, p.to_one));
     if (!references.update && fs::exists(file) && read_bytes(file) == png) return;
     const fs::path out = references.update ? file : references.failed / file.filename();
     fs::create_directories(out.parent_path());
     write_bytes(out, png);
-    if (!references.update) throw Wrong(p.line, p.text + " is not what is drawn by " + p.made_by + ": " + out.string());
+    if (!references.update) throw Wrong(p, p.text + " is not what is drawn by " + p.made_by + ": " + out.string());
 }
 
 // What is wrong with the passages that umbra itself makes true, or with those that the exercises' programs do.
@@ -275,14 +280,14 @@ inline Strings wrong(const std::vector<Passage>& passages, bool of_exercises, co
         if (p.kind == Passage::quote && !of_exercises) {
             const std::size_t n = found(p.body, split(text_of(p.text), '\n'));
             if (n < p.body.size())
-                throw Wrong(p.line + 1 + static_cast<int>(n), p.text + " does not hold: " + p.body[n]);
+                throw Wrong(p, p.text + " does not hold: " + p.body[n], p.line + 1 + static_cast<int>(n));
         }
         if (p.kind == Passage::fence && !p.text.empty() && p.text != "sh" && p.text != "text" && !of_exercises)
-            throw Wrong(p.line, "a fence of an unknown kind: " + p.text);
+            throw Wrong(p, "a fence of an unknown kind: " + p.text);
         if ((p.program > 0) != of_exercises || !desk().programs.count(p.program)) continue;
         if (p.kind == Passage::command) check_command(p);
         if (p.kind == Passage::output && split(desk().run(p.made_by, p.program).said.out, '\n') != p.body)
-            throw Wrong(p.line, "is not what is printed by " + p.made_by);
+            throw Wrong(p, "is not what is printed by " + p.made_by);
         if (p.kind == Passage::image) check_image(p, references);
     } catch (const std::exception& e) {
         all.push_back(e.what());
@@ -293,23 +298,26 @@ inline Strings wrong(const std::vector<Passage>& passages, bool of_exercises, co
 #ifdef UMBRA_COMPILER
 // Builds the exercises' programs, several at a time; says what is wrong with the others.
 inline Strings build(const std::vector<Passage>& passages) {
-    static std::vector<std::unique_ptr<Folder>> folders;
+    static std::vector<std::unique_ptr<Folder>> folders;  // as long as the programs may be run
     std::vector<Passage> exercises;
     for (const Passage& p : passages)
-        if (p.kind == Passage::exercise) exercises.push_back(p), folders.push_back(std::make_unique<Folder>());
+        if (p.kind == Passage::exercise) exercises.push_back(p);
+    const std::size_t first = folders.size();
+    for (std::size_t i = 0; i < exercises.size(); i++) folders.push_back(std::make_unique<Folder>());
     Strings why(exercises.size());
     parallel_for(static_cast<int>(exercises.size()), [&](int i, int) {
+        const Folder& folder = *folders[first + i];
         try {
-            folders[i]->write("main.cpp", changed(exercises[i], text_of("main.cpp")));
-            const Outcome o = folders[i]->run(quoted("@" UMBRA_FLAGS) + " main.cpp " + quoted(UMBRA_LIBRARY) +
-                                              " -o umbra", quoted(UMBRA_COMPILER));
-            if (o.status != 0) throw Wrong(exercises[i].line, "the exercise does not compile: " + o.err);
+            folder.write("main.cpp", changed(exercises[i], text_of("main.cpp")));
+            const Outcome o = folder.run(quoted("@" UMBRA_FLAGS) + " main.cpp " + quoted(UMBRA_LIBRARY) + " -o umbra",
+                                         quoted(UMBRA_COMPILER));
+            if (o.status != 0) throw Wrong(exercises[i], "the exercise does not compile: " + o.err);
         } catch (const std::exception& e) {
             why[i] = e.what();
         }
     });
     for (std::size_t i = 0; i < why.size(); i++)
-        if (why[i].empty()) desk().programs[exercises[i].program] = (*folders[i] / "umbra").string();
+        if (why[i].empty()) desk().programs[exercises[i].program] = (*folders[first + i] / "umbra").string();
     std::erase(why, "");
     return why;
 }

@@ -268,6 +268,31 @@ TEST("exercises: they compile, and their commands, pictures and figures are righ
         {"{.1} % of what faces the light is falsely lit, and {.2} % after the change; with all faces in the buffer it "
          "is {.2} %", {percent(back), percent(back, closed_bodies), percent(sail)}}}));
 }
+
+TEST("exercises: what the classic lesson's ways come to") {
+    report(build(parsed(text_of("tests/lesson/departures.md"), "departures.md", 100)));
+    enum { normals = 101, uv, corners, whole_numbers, lookat };
+    const auto off = [](int program) {
+        return pixels_that_differ(desk().run("build/umbra", program), desk().run("build/umbra"), 8);
+    };
+    const auto dark = [](int program) {
+        const PictureError e = error("build/umbra", program);
+        return e.percent(e.falsely_dark);
+    };
+    const auto pixels = [](const char* command) { return value(desk().run(command).said.out, "pixels"); };
+    const char *const idol = "build/umbra", *const aside = "build/umbra --center .3,.2,.1";
+    const TGAImage &here = desk().run(idol).framebuffer, &there = desk().run(idol, corners).framebuffer;
+    int outline = 0;
+    for (int y = 0; y < here.height(); y++)
+        for (int x = 0; x < here.width(); x++) outline += (here.get(x, y)[0] == 0) != (there.get(x, y)[0] == 0);
+    const double moved = pixels_that_differ(desk().run(aside, lookat), desk().run(aside), 8);
+    report(wrong_figures(readme, {
+        {"the projection leaks into them: {.1} % of the pixels", {100 * off(normals) / pixels(idol)}},
+        {"textures swim: {.2} % of the pixels", {100 * off(uv) / pixels(idol)}},
+        {"{.1} % of the pixels, {} along the outline", {100 * off(corners) / pixels(idol), double(outline)}},
+        {"{.2} % of what faces the light goes dark, not {.2} %", {dark(whole_numbers), dark(0)}},
+        {"with the centre at (.3, .2, .1): {.1} % of the pixels", {100 * moved / pixels(aside)}}}));
+}
 #endif
 
 int main(int argc, char** argv) { return run_tests(argc, argv); }
