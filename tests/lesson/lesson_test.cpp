@@ -150,6 +150,14 @@ TEST("README: the table of lights.csv") {
     check_rows("| light, half angle |", rows);
 }
 
+TEST("README: the table of left_out.csv") {
+    const Strings rows = table("README.md", "| scene | what is left out |");
+    for (const Strings& r : csv("left_out.csv"))
+        CHECK(std::any_of(rows.begin(), rows.end(), [&](const std::string& row) {
+            return row.find("`" + r[0] + "`") != row.npos && row.ends_with(filled({" | {.2} |", {stod(r[1])}}));
+        }));
+}
+
 TEST("README: the table of bench.csv") {
     const std::map<std::string, std::string> names{
         {"8640", "the knot"}, {"16000", "the idol"}, {"2492", "a head of 2 492 triangles"},

@@ -20,8 +20,9 @@ the light; those of them that are falsely dark and falsely lit, as counts and in
 
 The second, with -o or --rounds or without any argument, prints these figures, milliseconds and bytes of each shadow
 method at each size of its buffer, and what theory says of the error; the errors of stiff cases; and the figures of
-spot and point lights. It writes report.csv, stiffness.csv, lights.csv and report.svg into the folder DIR (.). The
-milliseconds are medians of N rounds (5) of N threads (1).
+spot and point lights. It writes report.csv, stiffness.csv, lights.csv, left_out.csv (how long a run takes that leaves
+things out, as a share of a whole one) and report.svg into the folder DIR (.). The milliseconds are medians of N rounds
+(5) of N threads (1).
 )";
 
 constexpr const char* bias = "43.34";           // the lesson's, of a depth of 2000 for two units of the scene ...
@@ -65,13 +66,14 @@ std::vector<Figures> lights(const Program& umbra, const Strings& scene) {
     return all;
 }
 
+double median(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
+}
+
 // All methods in turn, round after round: what slows the machine down for a while slows all of them.
 void measure_times(const Program& umbra, const Strings& scene, int rounds, std::vector<Figures>& figures) {
     std::vector<std::vector<double>> depth(figures.size()), shade = depth, total = depth;
-    const auto median = [](std::vector<double> values) {
-        std::sort(values.begin(), values.end());
-        return (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
-    };
     for (int round = 1; round <= rounds; round++) {
         std::cerr << "report: times, round " << round << " of " << rounds << '\n';
         for (std::size_t i = 0; i < figures.size(); i++) {
@@ -83,6 +85,32 @@ void measure_times(const Program& umbra, const Strings& scene, int rounds, std::
             f.bytes = std::llround(value(said, "shadow_bytes"));
         }
     }
+}
+
+// What is left out saves: the time of all stages, as a share of that of the default picture. In turn.
+std::string left_out(const Program& umbra, int rounds) {
+    const std::vector<Strings> all{{}, {"--shadow", "off"}, {"--only", "framebuffer"}, {"--only", "depth"},
+                                   {"--center", "9,0,0", "--eye", "9,0,4"}};
+    std::vector<std::vector<double>> shares(all.size());
+    for (int round = 0; round < rounds; round++) {
+        double whole = 0;
+        for (std::size_t i = 0; i < all.size(); i++) {
+            double took = 0;
+            for (int n = 0; n < 5; n++) {
+                const std::string said = umbra.run(all[i]);
+                for (const char* stage : {"load_ms", "depth_ms", "shade_ms", "write_ms"}) took += value(said, stage);
+            }
+            if (i == 0) whole = took;
+            shares[i].push_back(took / whole);
+        }
+    }
+    std::ostringstream out;
+    out << "options,share\n";
+    for (std::size_t i = 1; i < all.size(); i++) {
+        for (std::size_t k = 0; k < all[i].size(); k++) out << (k ? " " : "\"") << all[i][k];
+        out << "\"," << median(shares[i]) << '\n';
+    }
+    return out.str();
 }
 
 void predict_errors(const Program& umbra, const Strings& arguments, std::vector<Figures>& figures) {
@@ -186,7 +214,8 @@ void make_table(const Program& umbra, Strings scene) {
     const std::string subtitle = side + (" pixels, threads: " + threads) + ", median of " + rounds +
                                  " runs. Numbers at the marks: texels a side of the shadow buffer.";
     for (const auto& [name, text] : {std::pair<const char*, std::string>{"report.csv", csv(figures)},
-                                     {"lights.csv", csv(of_lights)}, {"stiffness.csv", csv(stiff)}, {"report.svg", svg(figures, title, subtitle)}})
+                                     {"lights.csv", csv(of_lights)}, {"stiffness.csv", csv(stiff)},
+                                     {"left_out.csv", left_out(umbra, n)}, {"report.svg", svg(figures, title, subtitle)}})
         write_bytes(out / name, Bytes(text.begin(), text.end()));
 }
 
