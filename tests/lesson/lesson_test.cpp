@@ -234,6 +234,14 @@ TEST("README: what is not true of it is reported") {
     CHECK_EQ(wrong_figures("so 1 235 of 1 234 567 calls, .2 or 0.2 %\n", figures).size(), 1u);
 }
 
+TEST("README: what walk says of a pixel is what is drawn") {
+    const TGAImage& drawn = desk().run("build/umbra --draw shadow").framebuffer;
+    for (const auto& [x, words] : {std::pair(470, "in shadow\n"), {440, "lit\n"}}) {
+        CHECK(desk().run("build/tests/walk " + std::to_string(x) + ",439").said.out.ends_with(words));
+        CHECK_EQ(int{drawn.get(x, 439)[0]}, x == 470 ? 0 : 255);
+    }
+}
+
 TEST("README: pixels are averaged, and counted where runs differ") {
     TGAImage picture(4, 2, TGAImage::GRAYSCALE);
     for (const int i : {0, 1, 2}) picture.pixel(i, 0)[0] = 1;  // 2 of 4, and 1 of 4
