@@ -649,7 +649,9 @@ static void view(Arguments at_rest, Scene& scene) {
     bool turns = false;
     int i = 0;
     double began = 0;
-    const auto rest = [&] { return std::max(0, static_cast<int>(20 + began - milliseconds())); };  // 50 pictures a second
+    const auto rest = [&] {  // 50 pictures a second
+        return std::max(0, static_cast<int>(20 + began - milliseconds()));
+    };
     for (char key = 0; key != 'q'; key = terminal.key(turns ? rest() : -1)) {
         if (key == ' ') turns = !turns;
         const bool is_new = obey(key, at_rest), resized = key == 0;

@@ -465,8 +465,9 @@ SCENE(glow_in_shadow, "--size 128x128 --shadow-size 512 --no-fit --eye .3,3,3 --
 
 // ---- that wrong pictures are noticed ----
 
-// The idol on its floor under the sky, and every kind of light: beside it, behind it, in its midst; beams that end on its
-// nose and beams that pass the picture on all sides; and one low above the floor, half of which is behind the light.
+// The idol on its floor under the sky, and every kind of light: beside it, behind it, in its midst; beams that end on
+// its nose and beams that pass the picture on all sides; and one low above the floor, half of which is behind the
+// light.
 TEST("the whole scene under every light") {
     const Scene folder([](Scene&) {});
     const std::string obj = UMBRA_OBJ_DIR, floor = ' ' + obj + "/floor/floor.obj";

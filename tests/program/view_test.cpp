@@ -16,11 +16,11 @@ namespace {
 // A pseudo-terminal, and the program in it.
 class PseudoTerminal {
 public:
-    explicit PseudoTerminal(Strings arguments, int columns = 60, int rows = 20) : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
+    explicit PseudoTerminal(Strings arguments) : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
         if (master_ < 0 || grantpt(master_) || unlockpt(master_)) throw std::runtime_error("no pseudo-terminal");
         const std::string name = ptsname(master_);
         slave_ = open(name.c_str(), O_RDWR | O_NOCTTY);
-        resize(columns, rows);
+        resize(60, 20);
         tcgetattr(slave_, &before_);
         arguments.insert(arguments.begin(), UMBRA_BINARY);
         std::vector<char*> words;

@@ -215,7 +215,8 @@ void make_table(const Program& umbra, Strings scene) {
                                  " runs. Numbers at the marks: texels a side of the shadow buffer.";
     for (const auto& [name, text] : {std::pair<const char*, std::string>{"report.csv", csv(figures)},
                                      {"lights.csv", csv(of_lights)}, {"stiffness.csv", csv(stiff)},
-                                     {"left_out.csv", left_out(umbra, n)}, {"report.svg", svg(figures, title, subtitle)}})
+                                     {"left_out.csv", left_out(umbra, n)},
+                                     {"report.svg", svg(figures, title, subtitle)}})
         write_bytes(out / name, Bytes(text.begin(), text.end()));
 }
 
