@@ -101,8 +101,8 @@ public:
     int rows() const;
     void show(const TGAImage& picture, std::string line) const;  // at the upper left, and the line below it
 
-    // The next key: its character, or ^ v < > for an arrow. 0 if none is pressed within so many milliseconds (-1: ever) or
-    // the window has changed; q where no more can come.
+    // The next key: its character, or ^ v < > for an arrow. 0 if none is pressed within so many milliseconds (-1: waits
+    // for ever) or the window has changed; q where no more can come.
     char key(int milliseconds) const;
 };
 
