@@ -152,10 +152,14 @@ TEST("README: the table of lights.csv") {
 
 TEST("README: the table of left_out.csv") {
     const Strings rows = table("README.md", "| scene | what is left out |");
-    for (const Strings& r : csv("left_out.csv"))
+    for (const Strings& r : csv("left_out.csv")) {
+        std::string options = r[0];  // which have commas, too
+        for (std::size_t i = 1; i + 1 < r.size(); i++) options += ',' + r[i];
         CHECK(std::any_of(rows.begin(), rows.end(), [&](const std::string& row) {
-            return row.find("`" + r[0] + "`") != row.npos && row.ends_with(filled({" | {.2} |", {stod(r[1])}}));
+            return row.find("`" + options + "`") != row.npos &&
+                   row.ends_with(filled({" | {.2} |", {stod(r.back())}}));
         }));
+    }
 }
 
 TEST("README: the table of bench.csv") {
