@@ -629,7 +629,8 @@ INLINED pack<std::int32_t> for_each_in_spans(const Coverage& c, const Edge (&edg
             else if (edges[i].right < 0) end = std::min(end, e.times + 1);
             else if (e.times < 0) end = 0;
             e.times += e.more_times, e.rest += e.more_rest;
-            if (e.rest >= e.divisor) e.times++, e.rest -= e.divisor;
+            const std::int64_t carry = (e.divisor - 1 - e.rest) >> 63;  // -1 or 0; a branch would be guessed wrong
+            e.times -= carry, e.rest -= e.divisor & carry;
         }
         if (begin >= end) continue;
         for (auto x = static_cast<int>(begin) / lanes * lanes; x < end; x += lanes) {
