@@ -32,6 +32,11 @@ constexpr int lanes = 8;
 constexpr int lanes = 4;
 #define BOTH_HALVES 0, 1, 2, 3
 #endif
+#if defined(BOTH_HALVES) && !defined(__AVX512F__)
+constexpr int registers_for_doubles = 2;
+#else
+constexpr int registers_for_doubles = 1;
+#endif
 
 template <class T, int n>
 struct vector_of {
@@ -42,10 +47,10 @@ struct vector_of {
 #endif
 };
 
-// Floats and 32-bit integers fill one register, doubles and 64-bit integers two.
+// Floats and 32-bit integers fill one register; doubles and 64-bit integers two, or one that is twice as long.
 template <class T>
 struct pack {
-    static constexpr int parts = lanes > 1 ? static_cast<int>(sizeof(T)) / 4 : 1;
+    static constexpr int parts = sizeof(T) == 8 ? registers_for_doubles : 1;
     using part = typename vector_of<T, lanes / parts>::type;
     part p[parts];
 
@@ -96,7 +101,7 @@ INLINED pack<To> converted(const pack<From>& a) {
 #if !defined(BOTH_HALVES)
     out.p[0] = static_cast<To>(a.p[0]);
 #else
-    if constexpr (sizeof(To) == sizeof(From)) {
+    if constexpr (pack<To>::parts == pack<From>::parts) {
         for (int i = 0; i < a.parts; i++) out.p[i] = __builtin_convertvector(a.p[i], typename pack<To>::part);
     } else if constexpr (sizeof(To) < sizeof(From)) {
         using half = typename vector_of<To, lanes / 2>::type;
@@ -118,13 +123,13 @@ template <class T>
 INLINED pack<std::int32_t> to_int(const pack<T>& a) { return converted<std::int32_t>(a); }  // towards zero
 
 struct mask {
-    pack<std::int32_t> m;  // 0 is no
+    pack<std::int32_t> m;  // -1 is yes, 0 no
     mask() = default;
     INLINED mask(bool b) : m(b ? -1 : 0) {}
-    INLINED explicit mask(const pack<std::int32_t>& a) { m.p[0] = a.p[0] != 0; }
+    INLINED explicit mask(const pack<std::int32_t>& a) : m(a) {}
     INLINED bool operator[](int i) const { return m[i] != 0; }
     INLINED friend mask operator!(mask a) {
-        a.m.p[0] = a.m.p[0] == 0;
+        a.m.p[0] = ~a.m.p[0];
         return a;
     }
     INLINED friend mask operator&(mask a, const mask& b) {
@@ -146,8 +151,8 @@ INLINED bool any(const mask& a) {
 
 #define COMPARING(T, op)                                                                              \
     INLINED mask operator op(const pack<T>& a, const pack<T>& b) {                                    \
-        pack<std::conditional_t<sizeof(T) == 8, std::int64_t, std::int32_t>> out;                     \
-        for (int i = 0; i < a.parts; i++) out.p[i] = a.p[i] op b.p[i];                                \
+        pack<std::conditional_t<sizeof(T) == 8, std::int64_t, std::int32_t>> out = 0;                 \
+        for (int i = 0; i < a.parts; i++) out.p[i] = a.p[i] op b.p[i] ? ~out.p[i] : out.p[i];         \
         return mask(to_int(out));                                                                     \
     }
 COMPARING(float, <) COMPARING(float, >) COMPARING(float, ==)
@@ -165,6 +170,19 @@ INLINED pack<T> select(const mask& m, const pack<T>& a, const std::type_identity
     return out;
 }
 INLINED real select(const mask& m, double a, const real& b) { return select(m, real(a), b); }
+
+// look_up(number) in each lane. Not a loop: compilers make gather instructions of loops that read, which take longer.
+template <class T, class Index, class F, int... i>
+INLINED pack<T> looked_up(const pack<Index>& numbers, F&& look_up, std::integer_sequence<int, i...>) {
+    Index at[lanes];
+    numbers.store(at);
+    const T values[]{look_up(at[i])...};
+    return pack<T>(values);
+}
+template <class T, class Index, class F>
+INLINED pack<T> looked_up(const pack<Index>& numbers, F&& look_up) {
+    return looked_up<T>(numbers, look_up, std::make_integer_sequence<int, lanes>());
+}
 
 // f(number) in each lane.
 template <class T, class F>

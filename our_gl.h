@@ -106,11 +106,8 @@ public:
     INLINED coord at(const vec<3, coord>& p) const {
         const mask inside = (!(p.x < 0)) & (!(p.y < 0)) & (p.x < w_) & (p.y < h_);
         const pack<std::int32_t> y = to_int(select(inside, p.y, 0)), x = to_int(select(inside, p.x, 0));
-        std::int32_t index[lanes];
-        (y * stride_ + x).store(index);
-        float z[lanes];
-        for (int i = 0; i < lanes; i++) z[i] = cells_[index[i]];
-        return to_coord(select(inside, real(z), nothing));
+        const real z = looked_up<float>(y * stride_ + x, [this](int cell) { return cells_[cell]; });
+        return to_coord(select(inside, z, nothing));
     }
 
 private:
@@ -169,8 +166,7 @@ INLINED vec<n, coord> interpolated(const vec<n> (&varying)[3], const vec<3, coor
 struct UV {
     vec<2, coord> given, wrapped;
     INLINED UV(const vec<2, coord>& uv) : given(uv), wrapped(componentwise<2, coord>([&](int i) {
-        const coord f = uv[i] - floor(uv[i]);
-        return select(f == f, f, 0);
+        return max(coord(0), uv[i] - floor(uv[i]));  // of 0 and NaN it is 0
     })) {}
 };
 
@@ -184,13 +180,12 @@ public:
         const vec<2, coord> uv = map.is_moved ? moved(map, at) : at.wrapped;
         const int w = map->width(), h = map->height();
         const pack<std::int32_t> x = min(to_int(uv.x * w), w - 1), y = min(to_int(uv.y * h), h - 1);
-        std::uint32_t index[lanes];  // a picture may have up to 2^32 pixels
-        (converted<std::uint32_t>(y) * w + converted<std::uint32_t>(x)).store(index);
-        const std::uint8_t* const first = map->pixel(0, 0);
-        std::int32_t bytes[lanes];
-        for (int i = 0; i < lanes; i++)
-            std::memcpy(&bytes[i], first + std::size_t{index[i]} * map->bytespp(), 4);
-        bytes_ = pack<std::int32_t>(bytes);
+        const auto index = converted<std::uint32_t>(y) * w + converted<std::uint32_t>(x);  // a picture may have 2^32
+        bytes_ = looked_up<std::int32_t>(index, [first = map->pixel(0, 0), bytespp = map->bytespp()](std::uint32_t i) {
+            std::int32_t bytes;
+            std::memcpy(&bytes, first + std::size_t{i} * bytespp, 4);
+            return bytes;
+        });
         if (map->bytespp() == 1) bytes_.p[0] = (bytes_.p[0] & 255) * 0x10101;  // grey
     }
     INLINED real operator[](int channel) const {
@@ -215,7 +210,7 @@ INLINED real power(real base, const real& exponent) {
     for (int bit = 1; bit < 256; bit *= 2, base = base * base) {
         pack<std::int32_t> is_set;
         is_set.p[0] = e.p[0] & bit;
-        result = select(mask(is_set), result * base, result);
+        result = select(is_set > 0, result * base, result);
     }
     return result;
 }
