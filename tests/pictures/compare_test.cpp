@@ -5,6 +5,8 @@
 #include "png.h"
 #include "run.h"
 
+#include <random>
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -105,6 +107,11 @@ TEST("the command says how pictures differ, and its status whether") {
     CHECK(compare(TGAImage::read_tga_file(folder / "diff.tga"), difference_picture(reference, wrong)).same());
     check("a.tga d.tga size.tga", 1, "the sizes differ\n");
     CHECK(!fs::exists(folder / "size.tga"));
+    write_bytes(folder / "a.png", png_file(reference));
+    write_bytes(folder / "cut.png", Bytes(50, 1));
+    check("c.tga a.png", 1, "1 of 2000 pixels differ, by 5 at most, at 7,3\n");
+    check("cut.png a.tga", 2, "compare_pictures: cut.png: no PNG file that was made here\n");
+    check("a.tga none.png", 2, "compare_pictures: none.png: cannot open\n");
     check("a.tga none.tga", 2, "compare_pictures: none.tga: cannot be opened: ");
     check("a.tga", 2, "usage: compare_pictures A.tga B.tga [DIFF.tga]\n");
 }
@@ -132,6 +139,23 @@ TEST("a PNG file has the chunks, the check sums and the size that it must have")
         CHECK(static_cast<int>(u32(16)) == picture.width() && static_cast<int>(u32(20)) == picture.height());
         const std::uint8_t colour_type = picture.bytespp() == TGAImage::GRAYSCALE ? 0 : 2;
         CHECK(Bytes(file.begin() + 24, file.begin() + 29) == (Bytes{8, colour_type, 0, 0, 0}));
+        CHECK(compare(png_picture(file), picture).same());
+    }
+}
+
+TEST("a picture comes back from its PNG file, and nothing from another") {
+    std::mt19937 rng(7);
+    for (int round = 0; round < 60; round++) {
+        const int width = static_cast<int>(rng() % 300) + 1, height = static_cast<int>(rng() % 40) + 1;
+        TGAImage picture(width, height, round % 2 ? TGAImage::RGB : TGAImage::GRAYSCALE);
+        const unsigned shades = 1 << rng() % 9;  // few ones repeat, near by and far off
+        std::generate(picture.pixel(0, 0), picture.pixel(0, picture.height()),
+                      [&] { return static_cast<std::uint8_t>(rng() % shades); });
+        Bytes file = png_file(picture);
+        CHECK(compare(png_picture(file), picture).same());
+        std::uint8_t& byte = file[rng() % file.size()];
+        byte = static_cast<std::uint8_t>(byte ^ 1 << rng() % 8);
+        CHECK_THROWS(png_picture(file), "no PNG file that was made here");
     }
 }
 

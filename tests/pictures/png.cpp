@@ -1,9 +1,10 @@
 // png.cpp: PNG files: chunks, and compression (RFC 1951) by the fixed codes, which need no tables. Rows are not
-// filtered: under those codes the differences of shades take more bytes than the shades.
+// filtered: under those codes the differences of shades take more bytes than the shades. Back again the same way.
 #include "png.h"
 
 #include <algorithm>
 #include <bit>
+#include <stdexcept>
 
 namespace {
 
@@ -64,6 +65,50 @@ Bytes deflate(const Bytes& data) {
     return out.bytes;
 }
 
+// What Bits wrote, from a byte on.
+struct Taken {
+    const Bytes& bytes;
+    std::size_t at;  // in bits
+
+    int get(int n) {  // lowest bit first
+        int value = 0;
+        for (int i = 0; i < n; i++, at++) value |= (bytes.at(at / 8) >> at % 8 & 1) << i;
+        return value;
+    }
+    int code(int n, int value = 0) {  // highest bit first
+        while (n-- > 0) value = value * 2 + get(1);
+        return value;
+    }
+    int symbol() {
+        int code_so_far = code(7);
+        if (code_so_far < 0x18) return code_so_far + 256;
+        code_so_far = code(1, code_so_far);
+        if (code_so_far < 0xC0) return code_so_far - 0x30;
+        if (code_so_far < 0xC8) return code_so_far - 0xC0 + 280;
+        return code(1, code_so_far) - 0x190 + 144;
+    }
+    int in_range(int value, int leading) {  // of what is left of a length or a distance when its code is known
+        const int bits = std::max(0, (value >> (leading - 1)) - 1);
+        return ((value - (bits << (leading - 1))) << bits) + get(bits);
+    }
+};
+
+// The data of a stream of deflate(), which is so long.
+Bytes inflate(Taken in, std::size_t size) {
+    Bytes out;
+    if (in.get(3) != 0b011) throw std::invalid_argument("not one block of fixed codes");
+    while (out.size() < size) {
+        const int symbol = in.symbol();
+        if (symbol < 256) {
+            out.push_back(static_cast<Byte>(symbol));
+        } else {
+            const int length = in.in_range(symbol - 257, 3) + 3, distance = in.in_range(in.code(5), 2) + 1;
+            for (int i = 0; i < length; i++) out.push_back(out.at(out.size() - distance));
+        }
+    }
+    return out;
+}
+
 void put_u32(Bytes& out, std::uint32_t value) {
     for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<Byte>(value >> shift));
 }
@@ -111,4 +156,25 @@ Bytes png_file(const TGAImage& picture) {
     put_chunk(file, "IDAT", stream);
     put_chunk(file, "IEND", {});
     return file;
+}
+
+TGAImage png_picture(const Bytes& file) {
+    try {
+        const auto u32 = [&](int i) {
+            return file.at(i) << 24 | file.at(i + 1) << 16 | file.at(i + 2) << 8 | file.at(i + 3);
+        };
+        const int width = u32(16), height = u32(20), bpp = file.at(25) == 0 ? 1 : 3;
+        constexpr std::size_t data_begin = 8 + 25 + 8 + 2;  // signature, IHDR, head of IDAT, head of the stream
+        const Bytes rows = inflate({file, data_begin * 8}, (1 + std::size_t{1} * bpp * width) * height);
+        TGAImage picture(width, height, bpp == 1 ? TGAImage::GRAYSCALE : TGAImage::RGB);
+        auto from = rows.begin();
+        for (int y = height - 1; y >= 0; y--) {
+            from++;
+            for (int x = 0; x < width; x++)
+                for (int c = bpp - 1; c >= 0; c--) picture.pixel(x, y)[c] = *from++;
+        }
+        if (png_file(picture) == file) return picture;
+    } catch (const std::exception&) {  // said below
+    }
+    throw std::invalid_argument("no PNG file that was made here");
 }

@@ -12,15 +12,15 @@
 
 namespace {
 
-constexpr const char* usage_text = R"(usage: report UMBRA'S OPTIONS AND MODELS
+constexpr const char* usage_text = R"(usage: report [umbra's options and models]
        report [-o DIR] [--rounds N] [--threads N] [umbra's options and models]
 
 The first prints what umbra's picture is off by: pixels that only one of picture and truth covers; the pixels that face
 the light; those of them that are falsely dark and falsely lit, as counts and in percent; and the RMSE of their colours.
 
-The second, with -o or --rounds or without any argument, prints these figures, milliseconds and bytes of each shadow
-method at each size of its buffer, and what theory says of the error; the errors of stiff cases; and the figures of
-spot and point lights. It writes report.csv, stiffness.csv, lights.csv, left_out.csv (how long a run takes that leaves
+The second, with -o or --rounds, takes minutes. It prints these figures, milliseconds and bytes of each shadow method at
+each size of its buffer, and what theory says of the error; the errors of stiff cases; and the figures of spot and point
+lights. It writes report.csv, stiffness.csv, lights.csv, left_out.csv (how long a run takes that leaves
 things out, as a share of a whole one) and report.svg into the folder DIR (.). The milliseconds are medians of N rounds
 (5) of N threads (1).
 )";
@@ -234,7 +234,7 @@ int main(int argc, char** argv) try {
     };
     if (given("--help")) return std::fputs(usage_text, stdout) < 0;
     const Program umbra(UMBRA_BINARY);
-    if (arguments.empty() || given("-o") || given("--rounds")) make_table(umbra, arguments);
+    if (given("-o") || given("--rounds")) make_table(umbra, arguments);
     else std::puts(Judge(umbra, arguments).error().line().c_str());
     return std::fflush(stdout) != 0;
 } catch (const ProgramFailed& e) {
