@@ -24,7 +24,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     int width = 800, height = 800;  // of the picture, in pixels
     int shadow_size = 800;          // of the shadow buffer, in pixels a side
     enum class Light { far, spot, point } light = Light::far;
-    vec3 light_dir{1, 1, 0};  // from center towards the light; to a spot or point light, which has a place, all the way
+    vec3 light_dir{1, 1, 0};  // from center towards the light; a spot or point light stands at its end
     double half_angle = 0;    // of a spot light's beam, or of what a point light's shadow buffer sees; in degrees
     bool square_beam = false;
     vec3 eye{1, 1, 4}, center{0, 0, 0}, up{0, 1, 0};
@@ -37,7 +37,8 @@ struct Options {  // the lesson's scene; the command line can change each of the
 
 // ---- pass 1: what the light sees ----
 
-// A light is a camera. One that is infinitely far off has no perspective; what another reaches comes to [-1,1]^2.
+// A light is a camera. One that is infinitely far off has no perspective; what another reaches comes to [-1,1]^2. The
+// direction serves as a place, since center is the origin by now: frame() has moved the scene.
 static Camera light_camera(const Options& opt) {
     return {lookat(opt.light_dir, opt.center, opt.up),
             opt.light == Options::Light::far ? projection(0) : beam(norm(opt.light_dir), opt.half_angle)};
@@ -82,7 +83,7 @@ struct PhongShader final : IShader {
     vec3 varying_nrm[3];       // normals of the vertices
     vec3 varying_color[3];     // colours of the vertices, red first
     vec3 varying_eye[3];       // the triangle in eye coordinates
-    vec4 varying_sb[3];        // the triangle on the light's screen, homogeneous, for exact shadows
+    vec4 varying_sb[3];        // the triangle on the light's screen, homogeneous: for the slope, and for exact shadows
     vec2 sb_slope;             // of its depth there, for the bias
 
     PhongShader(const Options& o, const Shadow& s, const Camera& camera, const Model& m)
@@ -206,7 +207,7 @@ static void first_pass(const Options& opt, const Models& casters, Shadow& shadow
     if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;  // M stays: drawn aside, read in place
     std::vector<DepthShader> shaders;
     for (const Model* model : casters) shaders.emplace_back(*model, light);
-    if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);  // kept from frame to frame
+    if (!shadow.shadowbuffer.width()) shadow.shadowbuffer = DepthBuffer(size, size);  // kept; draw() clears it
     draw(shaders, light.Viewport, shadow.shadowbuffer, opt.caster_faces);
 }
 
@@ -671,7 +672,7 @@ static void view(Arguments at_rest, Scene& scene) {
         std::string line = std::array{"light", "spot light", "point light"}[int(opt.light)];
         line += std::array{", shadow map, bias ", ", exact shadows", ", no shadows"}[int(opt.method)];
         if (opt.method == Options::Method::map) line += opt.bias ? std::to_string(*opt.bias).substr(0, 5) : "derived";
-        line += "   arrows: camera  wasd: light  space: turn  l: light  m: shadows  b: bias  p: write  q: quit";
+        line += "   q: quit  arrows: camera  wasd: light  space: turn  l: light  m: shadows  b: bias  p: write";
         if (key == 'p') line = "wrote " + write(opt, shadow, drawn(opt.width, opt.height), "");
         terminal.show(drawn(terminal.columns(), 2 * (terminal.rows() - 1)), line);
     }

@@ -33,9 +33,16 @@ struct FindingShader final : IShader {
     }
 };
 
+// Four decimals, which a pocket calculator can follow; more of what is small but no zero.
 void print(const char* name, const mat4& m) {
-    for (int i = 0; i < 4; i++)
-        std::printf("%-26s %10.4f %10.4f %10.4f %10.4f\n", i ? "" : name, m[i].x, m[i].y, m[i].z, m[i].w);
+    for (int i = 0; i < 4; i++) {
+        std::printf("%-26s", i ? "" : name);
+        for (int k = 0; k < 4; k++) {
+            const double v = m[i][k], size = std::fabs(v);
+            std::printf(size > 1e-12 && size < .01 ? " %10.3e" : " %10.4f", v);
+        }
+        std::putchar('\n');
+    }
 }
 void print(const char* name, const vec3& v) { std::printf("%-26s %10.4f %10.4f %10.4f\n", name, v.x, v.y, v.z); }
 
