@@ -167,7 +167,7 @@ struct PhongShader final : IShader {
         if (!material->tangent) return n;
         // Darboux frame (i, j, n): i is the direction across n in which u grows, at a right angle to the one along the
         // face in which u stays the same; j that of v. Found one by one, because a mirrored texture turns one of them
-        // round. No frame where uv do not span a plane.
+        // round. No frame where uv do not span a plane. Half edges do: whole ones may be too long for a double.
         const vec3 e1 = varying_eye[1] * .5 - varying_eye[0] * .5, e2 = varying_eye[2] * .5 - varying_eye[0] * .5;
         const vec2 uv1 = varying_uv[1] - varying_uv[0], uv2 = varying_uv[2] - varying_uv[0];
         const vec2 du = normalized(vec2{uv1.x, uv2.x} * material->tangent.scale.x);

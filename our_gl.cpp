@@ -1095,9 +1095,7 @@ void LightGrid::fill(const std::vector<int>& first_face, const std::vector<Exten
             entries[first[c + 1]++] = {extents[face].zmax, face};
         });
         first.pop_back();
-        const auto is_nearer = [](const Entry& p, const Entry& q) {
-            return p.zmax != q.zmax ? p.zmax > q.zmax : p.face < q.face;
-        };
+        const auto is_nearer = [](const Entry& p, const Entry& q) { return p.zmax > q.zmax; };
         for (std::size_t c = 0; c < count; c++)
             std::sort(entries.begin() + first[c], entries.begin() + first[c + 1], is_nearer);
     });
