@@ -54,7 +54,6 @@ std::vector<Figures> sentences() {
         {"{.2} % falsely dark instead of {.1} %, without any bias",
          {dark("--bias 0 --casters back"), dark("--bias 0")}},
         {"leak where their front and back lie in one texel: {.2} % are falsely lit", {lit("--bias 0 --casters back")}},
-        {"takes {.1} ms for the two passes of the idol", {stod(csv("bench.csv").at(6)[3])}},
         {"derives the bias instead ({.2} % on the knot, {.2} % on the idol)",
          {error(umbra + knot).percent(), error(umbra).percent()}},
         {"off by more than 8 of 255 at {} of {} pixels ({.1} %)",

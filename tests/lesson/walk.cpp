@@ -33,18 +33,18 @@ struct FindingShader final : IShader {
     }
 };
 
-// Four decimals, which a pocket calculator can follow; more of what is small but no zero.
+// As many digits as a pocket calculator needs to follow.
 void print(const char* name, const mat4& m) {
     for (int i = 0; i < 4; i++) {
         std::printf("%-26s", i ? "" : name);
         for (int k = 0; k < 4; k++) {
             const double v = m[i][k], size = std::fabs(v);
-            std::printf(size > 1e-12 && size < .01 ? " %10.3e" : " %10.4f", v);
+            std::printf(size > 1e-12 && size < .01 ? " %12.3e" : " %12.6f", v);
         }
         std::putchar('\n');
     }
 }
-void print(const char* name, const vec3& v) { std::printf("%-26s %10.4f %10.4f %10.4f\n", name, v.x, v.y, v.z); }
+void print(const char* name, const vec3& v) { std::printf("%-26s %12.4f %12.4f %12.4f\n", name, v.x, v.y, v.z); }
 
 }  // namespace
 
@@ -81,9 +81,9 @@ int main(int argc, char** argv) try {
     print("Mshadow", Mshadow);
     print("pixel and its depth", pixel);
     print("the same in object space", project(object));
-    std::printf("%-26s %10.4f %10.4f %10.4f %10.4f\n", "Mshadow * pixel", sb_h.x, sb_h.y, sb_h.z, sb_h.w);
+    std::printf("%-26s %12.4f %12.4f %12.4f %12.4f\n", "Mshadow * pixel", sb_h.x, sb_h.y, sb_h.z, sb_h.w);
     print("divided by w: sb_p", sb_p);
-    std::printf("%-26s %32.4f\n%-26s %32.4f\n", "stored in the buffer", stored, "sb_p.z + bias", sb_p.z + bias);
+    std::printf("%-26s %38.4f\n%-26s %38.4f\n", "stored in the buffer", stored, "sb_p.z + bias", sb_p.z + bias);
     std::puts(stored > sb_p.z + bias ? "something is nearer to the light: in shadow" : "nothing is nearer: lit");
     return 0;
 } catch (const std::exception& e) {
