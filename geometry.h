@@ -58,12 +58,14 @@ struct pack {
     template <class S> requires std::is_arithmetic_v<S>
     INLINED pack(S s) { for (part& each : p) each = static_cast<T>(s) - part{}; }
     INLINED explicit pack(const T (&values)[lanes]) { *this = load(values); }
-    INLINED static pack load(const T* from) {
+    INLINED static pack load(const T* from) {  // by registers: what is copied in smaller pieces waits in memory
         pack out;
-        std::memcpy(out.p, from, sizeof out.p);
+        for (int i = 0; i < parts; i++) std::memcpy(&out.p[i], from + lanes / parts * i, sizeof(part));
         return out;
     }
-    INLINED void store(T* to) const { std::memcpy(to, p, sizeof p); }
+    INLINED void store(T* to) const {
+        for (int i = 0; i < parts; i++) std::memcpy(to + lanes / parts * i, &p[i], sizeof(part));
+    }
     INLINED T operator[](int i) const {
         T values[lanes];
         store(values);
