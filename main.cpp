@@ -201,7 +201,7 @@ static void first_pass(const Options& opt, const Models& casters, Shadow& shadow
     shadow.M = light.to_screen();
     shadow.aspect = light.Projection[1][1] / light.Projection[0][0];
     if (exact) {
-        shadow.grid = LightGrid(casters, light, size);
+        shadow.grid.build(casters, light, size);
         return;
     }
     if (classic) light.Viewport = translation({.5, .5, 0}) * light.Viewport;  // M stays: drawn aside, read in place

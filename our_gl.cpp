@@ -991,8 +991,8 @@ LightGrid::Extent LightGrid::extent(int face) const {
             is_cut ? INFINITY : std::nextafter(static_cast<float>(high.z), INFINITY)};
 }
 
-LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
-    : cells_(cells), side_(cells), models_(models) {
+void LightGrid::build(const Models& models, const Camera& light, int cells) {
+    cells_ = cells, side_ = cells, scale_ = 1, zmax_ = 0, models_ = models;
     const mat4 to_screen = light.to_screen();
     std::vector<int> first_vert{0}, first_face{0};
     for (const Model* model : models) {
@@ -1000,7 +1000,7 @@ LightGrid::LightGrid(const Models& models, const Camera& light, int cells)
         first_face.push_back(first_face.back() + model->nfaces());
     }
     verts_.resize(first_vert.back()), faces_.resize(first_face.back());
-    if (light.Projection[3].z != 0) ws_.resize(verts_.size());
+    ws_.resize(light.Projection[3].z != 0 ? verts_.size() : 0);
     in_parts(first_vert, [&](int, int m, int begin, int end, int) {
         for (int i = begin; i < end; i++) {
             const vec4 p = to_screen * point(models[m]->vert(i));

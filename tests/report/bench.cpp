@@ -52,7 +52,7 @@ struct Bench {
         return o.status == 0 ? std::regex_replace(o.out, std::regex("\n"), " ") : "";
     }
 
-    // Each program draws as many frames as take half a second.
+    // Each program draws as many frames as take half a second, but at least 7: in the first ones memory is fresh.
     Row measured(const Case& c) const {
         Row row;
         const std::string size = std::to_string(c.size), threads = std::to_string(c.threads), model = quoted(c.model);
@@ -63,7 +63,7 @@ struct Bench {
             row.triangles = value(line, "triangles");
             return value(line, "depth_ms") + value(line, "shade_ms");
         };
-        const std::string n = std::to_string(std::clamp(static_cast<int>(500 / passes("")), 3, 100));
+        const std::string n = std::to_string(std::clamp(static_cast<int>(500 / passes("")), 7, 100));
         const std::string others = c.threads == 1 ? "0" : threads;  // threads beside the rasterizer's own
         const std::string rasterize = "LP_NUM_THREADS=" + others + ' ' + rasterizer + " --size " + size + " --frames " +
                                       n + " --out /dev/null " + model;

@@ -65,6 +65,7 @@ TEST("the fitted camera shows all of a model and no more") {
 
 TEST("the grid agrees with a look at every face") {
     Random r(2);
+    LightGrid grid;  // built again and again in the same memory
     for (int k = 0; k < 12; k++) {
         std::vector<vec3> corners;
         const double size = std::exp(r.in(-3, 0));
@@ -75,7 +76,9 @@ TEST("the grid agrees with a look at every face") {
         const std::vector<Model> models{model_of(corners)};
         const int cells = 1 + k * 5;
         const Camera light = light_on(models, r.point(1), cells);
-        const LightGrid grid(models, light, cells);
+        const Camera lamp{lookat({0, 0, 9}, {}, {0, 1, 0}), beam(9, 20), {}};
+        grid.build(models, fitted(lamp, models, 64), 64);  // nothing of that may be left
+        grid.build(models, light, cells);
         for (int i = 0; i < 4000; i++) {
             // A point on one of the faces; in long double: is any other face above it?
             const int own = static_cast<int>(r.rng() % 200);
