@@ -16,9 +16,6 @@
 #include <string>
 #include <tuple>
 #include <vector>
-#if __has_include(<unistd.h>)
-#include <unistd.h>
-#endif
 
 struct Options {  // the lesson's scene; the command line can change each of these
     int width = 800, height = 800;  // of the picture, in pixels
@@ -560,13 +557,6 @@ static double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// A line that is written over, for who waits at a terminal.
-static void progress([[maybe_unused]] int done, [[maybe_unused]] int all) {
-#ifdef STDERR_FILENO
-    if (isatty(STDERR_FILENO)) std::fprintf(stderr, done < all ? "\rframe %d of %d" : "\r\033[K", done, all);
-#endif
-}
-
 static double median(std::vector<double>& values) {
     std::sort(values.begin(), values.end());
     return values[values.size() / 2];
@@ -713,7 +703,7 @@ static void run(Arguments opt) {
         if (moves && first_pictures.empty()) first_pictures = pictures + " to ";
         depth_ms.push_back(first - began), shade_ms.push_back(drawn - first);
         write_ms.push_back(milliseconds() - drawn);
-        if (moves && !opt.quiet) progress(i + 1 - opt.first_frame, opt.end_frame - opt.first_frame);
+        if (moves && !opt.quiet) Terminal::progress(i + 1 - opt.first_frame, opt.end_frame - opt.first_frame);
     }
     const bool only_depth = opt.only == Arguments::Only::depth;
     const bool is_seen = only_depth ? !scene.casters.empty() : c.shaded > 0;

@@ -24,6 +24,8 @@
 #endif
 #if __has_include(<sys/mman.h>)
 #include <sys/mman.h>
+#endif
+#if __has_include(<unistd.h>)
 #include <unistd.h>
 #endif
 
@@ -421,6 +423,12 @@ Terminal::Terminal() { throw std::runtime_error("a terminal can be drawn on with
 Terminal::~Terminal() = default;
 char Terminal::key(int) const { return 'q'; }
 #endif
+
+void Terminal::progress([[maybe_unused]] int done, [[maybe_unused]] int all) {
+#ifdef STDERR_FILENO
+    if (isatty(STDERR_FILENO)) std::fprintf(stderr, done < all ? "\rframe %d of %d" : "\r\033[K", done, all);
+#endif
+}
 
 int Terminal::columns() const { return std::max(1, terminal_size().first); }
 int Terminal::rows() const { return std::max(2, terminal_size().second); }

@@ -104,6 +104,9 @@ public:
     // The next key: its character, or ^ v < > for an arrow. 0 if none is pressed within so many milliseconds (-1: waits
     // for ever) or the window has changed; q where no more can come.
     char key(int milliseconds) const;
+
+    // How many frames are drawn, where standard error is a terminal: a line that is written over, and goes at the end.
+    static void progress(int done, int all);
 };
 
 // A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. It is made in memory
