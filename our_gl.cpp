@@ -956,43 +956,8 @@ static double area2(const vec3& a, const vec3& b, const vec3& c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-// The cells of a face's box, and the float above its largest z: infinity for one that has a corner behind the light,
-// whose box is that of what is before it.
-struct LightGrid::Extent {
-    std::int16_t x0, x1, y0, y1;
-    float zmax;
-    bool is_cut() const { return zmax == INFINITY; }
-    int cells() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
-};
-
-LightGrid::Extent LightGrid::extent(int face) const {
-    vec3 p[4];
-    int n = 3;
-    bool is_cut = false;
-    for (const int v : faces_[face]) is_cut = is_cut || (!ws_.empty() && !(ws_[v] >= w_near));
-    if (is_cut) {
-        vec4 corners[3], cut[4];
-        for (int k = 0; k < 3; k++) {
-            const vec3& v = verts_[faces_[face][k]];
-            corners[k] = {v.x, v.y, v.z, ws_[faces_[face][k]]};
-        }
-        n = clip_polygon({3, 1, w_near}, corners, 3, cut);
-        for (int k = 0; k < n; k++) p[k] = project(cut[k]);
-    } else {
-        for (int k = 0; k < 3; k++) p[k] = on_screen(faces_[face][k]);
-    }
-    vec3 low = p[0], high = p[0];
-    for (int k = 1; k < n; k++)
-        for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[k][i]), high[i] = std::max(high[i], p[k][i]);
-    const auto cell = [&](double v) {  // NaN: 0
-        return v > 0 ? static_cast<std::int16_t>(std::min(v, cells_ - 1.)) : std::int16_t{0};
-    };
-    return {cell(low.x), cell(high.x), cell(low.y), cell(high.y),
-            is_cut ? INFINITY : std::nextafter(static_cast<float>(high.z), INFINITY)};
-}
-
 void LightGrid::build(const Models& models, const Camera& light, int cells) {
-    cells_ = cells, side_ = cells, scale_ = 1, zmax_ = 0, models_ = models;
+    cells_ = cells, side_ = cells, scale_ = 1, models_ = models;
     const mat4 to_screen = light.to_screen();
     std::vector<int> first_vert{0}, first_face{0};
     for (const Model* model : models) {
@@ -1001,104 +966,109 @@ void LightGrid::build(const Models& models, const Camera& light, int cells) {
     }
     verts_.resize(first_vert.back()), faces_.resize(first_face.back());
     ws_.resize(light.Projection[3].z != 0 ? verts_.size() : 0);
-    in_parts(first_vert, [&](int, int m, int begin, int end, int) {
-        for (int i = begin; i < end; i++) {
+    std::vector<double> highest(parts(first_vert));
+    in_parts(first_vert, [&](int part, int m, int begin, int end, int) {
+        for (int i = begin, v = first_vert[m] + begin; i < end; i++, v++) {
             const vec4 p = to_screen * point(models[m]->vert(i));
-            verts_[first_vert[m] + i] = p.xyz();
-            if (!ws_.empty()) ws_[first_vert[m] + i] = p.w;
+            verts_[v] = p.xyz();
+            if (!ws_.empty()) ws_[v] = p.w;
+            const double z = std::fabs(on_screen(v).z);
+            if (z <= 2 * screen_depth) highest[part] = std::max(highest[part], z);
         }
     });
+    zmax_ = *std::max_element(highest.begin(), highest.end());
     in_parts(first_face, [&](int, int m, int begin, int end, int) {
         for (int i = begin; i < end; i++)
             for (int k = 0; k < 3; k++) faces_[first_face[m] + i][k] = first_vert[m] + models[m]->corner(i, k).vert;
     });
-    for (int v = 0; v < first_vert.back(); v++) {
-        const double z = std::fabs(on_screen(v).z);
-        if (z <= 2 * screen_depth) zmax_ = std::max(zmax_, z);
-    }
 
-    // A face in a soup of large ones may touch every cell. Where that would make the lists longer than most_entries a
-    // face, the cells are made larger by powers of two, which changes no result: so memory is bounded by the number of
-    // faces.
-    constexpr std::int64_t most_entries = 64;
-    std::vector<Extent> extents(faces_.size());
+    // A face in a soup of large ones may touch every cell. Where the large ones would make the lists longer than 64
+    // entries a face, the cells are made larger by powers of two, which changes no result: so memory is bounded by the
+    // number of faces.
     for (;;) {
-        std::atomic<std::int64_t> sum = 0;
-        in_parts(first_face, [&](int, int m, int begin, int end, int) {
-            std::int64_t own = 0;
-            for (int i = first_face[m] + begin; i < first_face[m] + end; i++) {
-                extents[i] = extent(i);
-                own += extents[i].cells();
-            }
-            sum += own;
+        band_rows_ = (cells_ + 63) / 64;
+        bands_.resize((cells_ + band_rows_ - 1) / band_rows_);
+        touches_.resize(parts(first_face));
+        for (auto& of_bands : touches_) {
+            of_bands.resize(bands_.size());
+            for (auto& touches : of_bands) touches.clear();
+        }
+        std::atomic<std::int64_t> left = std::int64_t{64} * first_face.back();  // places for large faces
+        in_parts(first_face, [&](int part, int m, int begin, int end, int) {
+            for (int face = first_face[m] + begin; face < first_face[m] + end; face++)
+                sort_into_bands(face, touches_[part], left);
         });
-        if (cells_ == 1 || sum <= most_entries * first_face.back()) break;
+        if (left >= 0) break;
         cells_ = (cells_ + 1) / 2, scale_ /= 2, side_ /= 2;
         for (vec3& v : verts_) v.x /= 2, v.y /= 2;
     }
-    fill(first_face, extents);
+    parallel_for(static_cast<int>(bands_.size()), [&](int b, int) { fill(b); });
 }
 
-// Puts the faces, first_face[m] on those of model m, into the lists of the cells that they touch.
-void LightGrid::fill(const std::vector<int>& first_face, const std::vector<Extent>& extents) {
-    // The cells on the rows [y_begin, y_end) that a face touches: of a larger box those that lie on the inner side of
-    // its three edges, at least in part; asking costs more than it saves for a small one.
-    const auto for_each_cell = [&](int face, int y_begin, int y_end, auto&& visit) {
-        const Extent& box = extents[face];
-        const bool is_small = box.cells() <= 9 || box.is_cut();
-        vec3 p[3];
-        for (int i = 0; i < 3 && !is_small; i++) p[i] = on_screen(faces_[face][i]);
-        const double side = area2(p[0], p[1], p[2]);
-        for (int y = std::max<int>(y_begin, box.y0); y < std::min(y_end, box.y1 + 1); y++) {
-            for (int x = box.x0; x <= box.x1; x++) {
-                bool outside = false;
-                for (int i = 0; i < 3 && !outside && !is_small; i++) {
-                    const vec3 &a = p[i], &b = p[(i + 1) % 3];
-                    // The cell's corner farthest inwards. Rounding of the products is below 2^-50 of their size.
-                    const double nx = side < 0 ? b.y - a.y : a.y - b.y, ny = side < 0 ? a.x - b.x : b.x - a.x;
-                    const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
-                    outside = nx * dx + ny * dy < -(std::fabs(nx * dx) + std::fabs(ny * dy)) * 0x1p-48;
-                }
-                if (!outside) visit(std::size_t{1} * cells_ * (y - y_begin) + x);
-            }
+// Notes which cells a face touches. None for one that the light sees edge-on, which casts no shadow, or one beyond the
+// range of a double. A large one takes the cells of its box from the places left, and none if there are too few.
+void LightGrid::sort_into_bands(int face, std::vector<std::vector<Touch>>& touches, std::atomic<std::int64_t>& left) {
+    vec3 p[4];
+    int n = 3;
+    bool is_cut = false;  // it has a corner behind the light: then it is what is before it that counts
+    for (const int v : faces_[face]) is_cut = is_cut || (!ws_.empty() && !(ws_[v] >= w_near));
+    if (is_cut) {
+        vec4 corners[3], cut[4];
+        for (int k = 0; k < 3; k++) {
+            const vec3& v = verts_[faces_[face][k]];
+            corners[k] = {v.x, v.y, v.z, ws_[faces_[face][k]]};
         }
+        n = clip_polygon({3, 1, w_near}, corners, 3, cut);
+        if (n < 3) return;
+        for (int k = 0; k < n; k++) p[k] = project(cut[k]);
+    } else {
+        for (int k = 0; k < 3; k++) p[k] = on_screen(faces_[face][k]);
+    }
+    const double side = area2(p[0], p[1], p[2]);
+    if (!is_cut && !(std::fabs(side) > 0)) return;
+    vec3 low = p[0], high = p[0];
+    for (int k = 1; k < n; k++)
+        for (int i = 0; i < 3; i++) low[i] = std::min(low[i], p[k][i]), high[i] = std::max(high[i], p[k][i]);
+    const auto cell = [&](double v) {  // NaN: 0
+        return v > 0 ? static_cast<int>(std::min(v, cells_ - 1.)) : 0;
     };
-    // The cells are filled in bands of rows, each by one thread. Which faces touch a band is found first: none that the
-    // light sees edge-on, which casts no shadow, nor one beyond the range of a double.
-    band_rows_ = (cells_ + 63) / 64;
-    bands_.resize((cells_ + band_rows_ - 1) / band_rows_);
-    std::vector<std::vector<std::vector<int>>> touching(parts(first_face));
-    for (auto& faces_of_band : touching) faces_of_band.resize(bands_.size());
-    in_parts(first_face, [&](int part, int m, int begin, int end, int) {
-        for (int face = first_face[m] + begin; face < first_face[m] + end; face++) {
-            const auto [i, j, k] = faces_[face];
-            const Extent& box = extents[face];
-            if (!box.is_cut() && !(std::fabs(area2(on_screen(i), on_screen(j), on_screen(k))) > 0)) continue;
-            for (int b = box.y0 / band_rows_; b <= box.y1 / band_rows_; b++) touching[part][b].push_back(face);
+    const int x0 = cell(low.x), x1 = cell(high.x), y0 = cell(low.y), y1 = cell(high.y);
+    const int cells = (x1 - x0 + 1) * (y1 - y0 + 1);
+    if (cells > 9 && (left -= cells) < 0) return;
+    const float zmax = is_cut ? INFINITY : std::nextafter(static_cast<float>(high.z), INFINITY);
+    // Of a larger box those that lie on the inner side of its three edges, at least in part; asking costs more than it
+    // saves for a small one.
+    for (int y = y0; y <= y1; y++) {
+        for (int x = x0; x <= x1; x++) {
+            bool outside = false;
+            for (int i = 0; i < 3 && !outside && cells > 9 && !is_cut; i++) {
+                const vec3 &a = p[i], &b = p[(i + 1) % 3];
+                // The cell's corner farthest inwards. Rounding of the products is below 2^-50 of their size.
+                const double nx = side < 0 ? b.y - a.y : a.y - b.y, ny = side < 0 ? a.x - b.x : b.x - a.x;
+                const double dx = (nx > 0 ? x + 1 : x) - a.x, dy = (ny > 0 ? y + 1 : y) - a.y;
+                outside = nx * dx + ny * dy < -(std::fabs(nx * dx) + std::fabs(ny * dy)) * 0x1p-48;
+            }
+            if (!outside) touches[y / band_rows_].push_back({{zmax, face}, cells_ * (y % band_rows_) + x});
         }
-    });
-    parallel_for(static_cast<int>(bands_.size()), [&](int b, int) {
-        std::vector<std::uint32_t>& first = bands_[b].first;
-        std::vector<Entry>& entries = bands_[b].entries;
-        const auto for_each_entry = [&](auto&& visit) {
-            for (const auto& faces_of_band : touching)
-                for (const int face : faces_of_band[b])
-                    for_each_cell(face, b * band_rows_, (b + 1) * band_rows_, [&](std::size_t c) { visit(c, face); });
-        };
-        // Count, sum up, fill: a list for each cell in one array.
-        const std::size_t count = std::size_t{1} * cells_ * band_rows_;
-        first.assign(count + 2, 0);
-        for_each_entry([&](std::size_t c, int) { first[c + 2]++; });
-        for (std::size_t c = 2; c < first.size(); c++) first[c] += first[c - 1];
-        entries.resize(first.back());
-        for_each_entry([&](std::size_t c, int face) {
-            entries[first[c + 1]++] = {extents[face].zmax, face};
-        });
-        first.pop_back();
-        const auto is_nearer = [](const Entry& p, const Entry& q) { return p.zmax > q.zmax; };
-        for (std::size_t c = 0; c < count; c++)
-            std::sort(entries.begin() + first[c], entries.begin() + first[c + 1], is_nearer);
-    });
+    }
+}
+
+// Makes the lists of a band's cells, all in one array: count, sum up, fill.
+void LightGrid::fill(int band) {
+    std::vector<std::uint32_t>& first = bands_[band].first;
+    std::vector<Entry>& entries = bands_[band].entries;
+    const std::size_t cells = std::size_t{1} * cells_ * band_rows_;
+    first.assign(cells + 2, 0);
+    for (const auto& of_bands : touches_)
+        for (const Touch& t : of_bands[band]) first[t.cell + 2]++;
+    for (std::size_t c = 2; c < first.size(); c++) first[c] += first[c - 1];
+    entries.resize(first.back());
+    for (const auto& of_bands : touches_)
+        for (const Touch& t : of_bands[band]) entries[first[t.cell + 1]++] = t;
+    first.pop_back();
+    const auto is_nearer = [](const Entry& p, const Entry& q) { return p.zmax > q.zmax; };
+    for (std::size_t c = 0; c < cells; c++)
+        std::sort(entries.begin() + first[c], entries.begin() + first[c + 1], is_nearer);
 }
 
 int LightGrid::first_face(const Model& model) const {

@@ -11,6 +11,7 @@
 #include "tgaimage.h"
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -295,7 +296,7 @@ class LightGrid {
 public:
     LightGrid() = default;
     // The light's screen is cells x cells large; what of the faces is beyond it throws no shadow. Takes at most
-    // 32 bytes a vertex, 1.1 KB a face and 5 bytes a cell.
+    // 32 bytes a vertex, 2.5 KB a face and 5 bytes a cell.
     LightGrid(const Models& models, const Camera& light, int cells) { build(models, light, cells); }
     void build(const Models& models, const Camera& light, int cells);  // anew, in the same memory
 
@@ -308,16 +309,18 @@ public:
     // Whether any face but `number` lies between the light and a point of that face, given on the light's screen.
     mask shadows(const vec<3, coord>& on_screen, int number) const;
 
-    std::size_t bytes() const;
+    std::size_t bytes() const;  // that are read when shadows are looked up
 
 private:
     struct Entry {
         float zmax;  // of the face, rounded up
         std::int32_t face;
     };
-    struct Extent;
-    Extent extent(int face) const;
-    void fill(const std::vector<int>& first_face, const std::vector<Extent>& extents);
+    struct Touch : Entry {  // before the lists are made
+        std::int32_t cell;  // of its band
+    };
+    void sort_into_bands(int face, std::vector<std::vector<Touch>>& touches, std::atomic<std::int64_t>& left);
+    void fill(int band);
     vec3 on_screen(int v) const { return ws_.empty() ? verts_[v] : verts_[v] / ws_[v]; }
     mask covers(int face, const vec<3, coord>& p) const;
 
@@ -335,4 +338,5 @@ private:
     std::vector<double> ws_;                 // of a light with a place
     std::vector<std::array<int, 3>> faces_;  // as indices of vertices
     std::vector<Band> bands_;
+    std::vector<std::vector<std::vector<Touch>>> touches_;  // found by each part of build(), of each band
 };
