@@ -231,8 +231,8 @@ TGAImage depth_picture(const DepthBuffer& depths, double aspect) {
         for (int x = 0; x < columns; x++) {  // the cell in which the pixel's centre lies
             const float z = depths.row((2 * y + 1) * h / (2 * rows))[(2 * x + 1) * w / (2 * columns)];
             std::uint8_t& pixel = *picture.pixel((w - columns) / 2 + x, (h - rows) / 2 + y);
-            if (z != DepthBuffer::nothing)
-                pixel = static_cast<std::uint8_t>(white - scale * (double{near} - double{z}));
+            const double below = scale * (double{near} - double{z});  // rounding may make it too large by a hair
+            if (z != DepthBuffer::nothing) pixel = static_cast<std::uint8_t>(white - std::min(below, white - darkest));
         }
     return picture;
 }
@@ -374,8 +374,8 @@ void in_parts(const std::vector<int>& first, Work&& work) {
 
 // ---- a face on the screen ----
 
-// Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers; depth and barycentric
-// coordinates come from the corners as they are.
+// Corners are snapped to 1/65536 pixel for coverage, which is decided in whole numbers, and for what is nearest;
+// barycentric coordinates come from the corners as they are.
 constexpr int subpixel_bits = 16;
 // Of a triangle cut by five planes. A plane adds one corner to what is convex; where rounding bends a face seen edge-on
 // it may add one for every two: 3, 4, 6, 9, 13, 19.
@@ -481,18 +481,17 @@ int clip(const Screen& s, int width, int height, Point (&corners)[most_corners])
     return n;
 }
 
-// The pixels whose centres lie in the box of a face, and its depth, which is linear on the screen.
-struct Coverage {
+// The pixels whose centres lie in the box of a face, and the depths of its corners.
+struct Box {
     int xmin, xmax, ymin, ymax;
-    bool is_small;  // the box is at most small_box pixels wide and high
-    double zx, zy, z0;   // depth = zx (x - xmin) + zy (y - ymin) + z0 at the centre of the pixel (x,y) ...
-    double zmin, zmax;   // ... and no smaller or larger than those of its corners
+    bool is_small;  // at most small_box pixels wide and high
+    double zmin, zmax;
 };
 
 constexpr int small_box = 60;
 
 // The box and the range of depths of a polygon; false where it covers no pixel's centre.
-INLINED bool bound(const Point* corners, int n, int width, int height, Coverage& c) {
+INLINED bool bound(const Point* corners, int n, int width, int height, Box& c) {
     constexpr std::int32_t half = 1 << (subpixel_bits - 1);
     Point low = corners[0], high = low;
     for (int i = 1; i < n; i++) {
@@ -512,18 +511,33 @@ INLINED bool bound(const Point* corners, int n, int width, int height, Coverage&
     return c.xmin <= c.xmax && c.ymin <= c.ymax;
 }
 
+// Depth is linear on the screen: zx (x - xmin) + zy (y - ymin) + z0 at the centre of the pixel (x,y), where (xmin,ymin)
+// is the first of the face's box.
+struct DepthPlane {
+    double zx, zy, z0;
+};
+
+// Through the corners of a triangle as they are snapped, whose signed area is half of area2. So a depth is off by what
+// half a sub-pixel along each axis may change, and inside it is a mean of the corners'.
+INLINED DepthPlane depth_plane(const Point& a, const Point& b, const Point& c, double area2, const Box& box) {
+    constexpr double one = 1 << subpixel_bits;
+    const double bx = b.x - a.x, by = b.y - a.y, bz = b.z - a.z, cx = c.x - a.x, cy = c.y - a.y, cz = c.z - a.z;
+    const double share = one / area2, zx = (bz * cy - cz * by) * share, zy = (cz * bx - bz * cx) * share;
+    return {zx, zy, a.z + zx * (box.xmin + .5 - a.x / one) + zy * (box.ymin + .5 - a.y / one)};
+}
+
 // Perspective without a division per corner (Olano and Greer, "Triangle scan conversion using 2D homogeneous
 // coordinates", 1997): with the corners as rows (x,y,w) of a matrix, the columns of its adjugate are functions ex dx +
 // ey dy + e0 that are linear on the screen, and in the ratio of the barycentric coordinates on the face. They hold for
 // the whole face, clipped or not, corners behind the eye included. dx and dy are relative to the centre of the pixel
 // (xmin, ymin) of the face, which keeps the products small.
-struct Barycentric {
+struct Barycentric : DepthPlane {
     vec3 ex, ey, e0;
     bool front_facing;
 };
 
-// Also completes c by the depth, sum(z_i e_i) / sum(w_i e_i): the denominator is |det| everywhere.
-INLINED Barycentric planes(Screen& s, Coverage& c) {
+// The depth is sum(z_i e_i) / sum(w_i e_i): the denominator is |det| everywhere.
+INLINED Barycentric planes(Screen& s, const Box& box) {
     // The products of three coordinates that follow stay within the range of a double for these sizes; others are
     // scaled.
     if (!(s.size > 0x1p-200 && s.size < 0x1p200))
@@ -531,17 +545,14 @@ INLINED Barycentric planes(Screen& s, Coverage& c) {
             for (int i = 0; i < 4; i++) p[i] = std::scalbn(p[i], -std::ilogb(s.size));
     const vec4* const p = s.corner;
     vec3 v[3];
-    for (int i = 0; i < 3; i++) v[i] = {p[i].x - (c.xmin + .5) * p[i].w, p[i].y - (c.ymin + .5) * p[i].w, p[i].w};
+    for (int i = 0; i < 3; i++) v[i] = {p[i].x - (box.xmin + .5) * p[i].w, p[i].y - (box.ymin + .5) * p[i].w, p[i].w};
     vec3 e[3] = {cross(v[1], v[2]), cross(v[2], v[0]), cross(v[0], v[1])};
     const double det = dot(v[0], e[0]);
-    if (det == 0 || !std::isfinite(det)) {
-        // Seen exactly edge-on, yet snapped to a sliver: its neighbours leave those samples to it. It shows corner 0.
-        c.zx = c.zy = 0, c.z0 = c.zmax;
-        return {{}, {}, {1, 0, 0}, true};
-    }
+    // Seen exactly edge-on, yet snapped to a sliver: its neighbours leave those samples to it. It shows corner 0.
+    if (det == 0 || !std::isfinite(det)) return {{0, 0, box.zmax}, {}, {}, {1, 0, 0}, true};
     if (det < 0)
         for (vec3& f : e) f = -f;
-    const Barycentric b{{e[0].x, e[1].x, e[2].x}, {e[0].y, e[1].y, e[2].y}, {e[0].z, e[1].z, e[2].z}, det > 0};
+    Barycentric b{{}, {e[0].x, e[1].x, e[2].x}, {e[0].y, e[1].y, e[2].y}, {e[0].z, e[1].z, e[2].z}, det > 0};
     // Depths are taken relative to that of the corner farthest in front of the eye, so that a small slope is not the
     // difference of large numbers.
     const int r = p[0].w >= p[1].w ? (p[0].w >= p[2].w ? 0 : 2) : (p[1].w >= p[2].w ? 1 : 2);
@@ -549,9 +560,7 @@ INLINED Barycentric planes(Screen& s, Coverage& c) {
     vec3 z{p[0].z - z_r * p[0].w, p[1].z - z_r * p[1].w, p[2].z - z_r * p[2].w};
     z[r] = 0;
     const double share = 1 / std::fabs(det);
-    c.zx = dot(z, b.ex) * share;
-    c.zy = dot(z, b.ey) * share;
-    c.z0 = z_r + dot(z, b.e0) * share;
+    b.zx = dot(z, b.ex) * share, b.zy = dot(z, b.ey) * share, b.z0 = z_r + dot(z, b.e0) * share;
     return b;
 }
 
@@ -579,7 +588,7 @@ struct Edge {
 // corners differ by at most 60 pixels, and a pixel beside the box by at most 7 more, so that what is left of two
 // products without the bits that are cut off is below 2 * 60 * 67 * 2^16 < 2^29.
 template <class Visit>
-INLINED pack<std::int32_t> for_each_in_box(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end,
+INLINED pack<std::int32_t> for_each_in_box(const Box& c, const Edge (&edges)[3], int y_begin, int y_end,
                                            Visit&& visit) {
     using Lanes = pack<std::int32_t>;
     Lanes row[3], right[3], up[3], inside_in_all = 0;
@@ -604,7 +613,7 @@ INLINED pack<std::int32_t> for_each_in_box(const Coverage& c, const Edge (&edges
 // The same for a triangle of any size. How often the step along a row goes into an edge function is where that changes
 // its sign; from row to row it grows by a quotient and a remainder, as in Bresenham's lines.
 template <class Visit>
-INLINED pack<std::int32_t> for_each_in_spans(const Coverage& c, const Edge (&edges)[3], int y_begin, int y_end,
+INLINED pack<std::int32_t> for_each_in_spans(const Box& c, const Edge (&edges)[3], int y_begin, int y_end,
                                              Visit&& visit) {
     struct Crossing {
         std::int64_t divisor, times, rest, more_times, more_rest;
@@ -644,16 +653,11 @@ INLINED pack<std::int32_t> for_each_in_spans(const Coverage& c, const Edge (&edg
 
 // ---- drawing ----
 
-struct Face : Coverage {
+struct Face : Box {
     int shader, iface;
 };
 
-// A vertex on the screen: homogeneous, and snapped; point.x is to_be_clipped where it is not within the guard band.
-struct Vertex {
-    vec4 screen;
-    Point point;
-};
-constexpr std::int32_t to_be_clipped = INT32_MIN;
+constexpr std::int32_t to_be_clipped = INT32_MIN;  // the x of a vertex that is not within the guard band
 
 // Some consecutive faces, looked at by one thread.
 struct Block {
@@ -684,8 +688,7 @@ struct Pass {
     const int stride = (width + lanes - 1) / lanes * lanes;  // a row is as long as a whole number of lanes
     std::vector<int> first_face{0};  // of each shader, among all
     std::vector<int> first_vertex{0};
-    std::vector<const Model*> models{};
-    std::vector<Vertex>& vertices = kept<Vertex>();
+    std::vector<Point>& vertices = kept<Point>();
     std::vector<Block>& blocks = kept<Block>();
     std::vector<Workspace>& spaces = kept<Workspace>();
 
@@ -698,7 +701,7 @@ struct Pass {
 
     Counters draw() {
         for (int i = 0; i < nshaders; i++) {
-            const Model& model = *models.emplace_back(&shader(i, 0).model);
+            const Model& model = shader(i, 0).model;
             first_face.push_back(first_face[i] + model.nfaces());
             first_vertex.push_back(first_vertex[i] + model.nverts());
         }
@@ -712,8 +715,9 @@ struct Pass {
             b.touching.resize(strips), b.count = {};
             for (std::vector<int>& faces : b.touching) faces.clear();
         }
-        in_parts(first_face, [this](int part, int s, int begin, int end, int) {
-            for (int i = begin; i < end; i++) sort_into_strips({{}, s, i}, blocks[part]);
+        in_parts(first_face, [this](int part, int s, int begin, int end, int thread) {
+            const IShader& own = shader(s, thread);
+            for (int i = begin; i < end; i++) sort_into_strips({{}, s, i}, own, blocks[part]);
         });
         spaces.resize(thread_count());
         for (Workspace& w : spaces) w.count = {};
@@ -724,32 +728,35 @@ struct Pass {
         return total;
     }
 
-    Vertex placed(const vec4& s) const {
+    Point placed(const vec4& s) const {
         const bool inside = s.w >= w_near && s.x >= -guard * s.w && s.x <= (width + guard) * s.w &&
                             s.y >= -guard * s.w && s.y <= (height + guard) * s.w && s.w <= 0x1p100 &&
                             std::fabs(s.z) <= 0x1p100;
-        return {s, inside ? snapped(s, width, height) : Point{to_be_clipped, 0, 0}};
+        return inside ? snapped(s, width, height) : Point{to_be_clipped, 0, 0};
     }
 
-    // The corners of a face, homogeneous and those of what is left of it after clipping. Returns how many these are.
-    int corners_of(const Face& face, Screen& screen, Point (&corners)[most_corners]) const {
-        const Vertex* const all = &vertices[first_vertex[face.shader]];
+    Screen homogeneous(const Face& face, const IShader& own) const {
+        Screen s;
+        for (int i = 0; i < 3; i++) s.corner[i] = Viewport * own.vertex(own.model.corner(face.iface, i).vert);
+        return s;
+    }
+
+    // The corners of what is left of a face after clipping. Returns how many these are.
+    int corners_of(const Face& face, const IShader& own, Point (&corners)[most_corners]) const {
         bool inside = true;
         for (int i = 0; i < 3; i++) {
-            const Vertex& v = all[models[face.shader]->corner(face.iface, i).vert];
-            screen.corner[i] = v.screen, corners[i] = v.point;
-            inside = inside && v.point.x != to_be_clipped;
+            corners[i] = vertices[first_vertex[face.shader] + own.model.corner(face.iface, i).vert];
+            inside = inside && corners[i].x != to_be_clipped;
         }
-        screen.size = 1;
         if (inside) return 3;
+        Screen screen = homogeneous(face, own);
         return measure(screen) && !is_outside(screen, width, height) ? clip(screen, width, height, corners) : 0;
     }
 
-    void sort_into_strips(const Face& face, Block& block) const {
-        Screen screen;
+    void sort_into_strips(const Face& face, const IShader& own, Block& block) const {
         Point corners[most_corners];
-        Coverage c;
-        const int n = corners_of(face, screen, corners);
+        Box c;
+        const int n = corners_of(face, own, corners);
         block.count.triangles++;
         if (n == 0) block.count.outside++;
         else if (!bound(corners, n, width, height, c)) {
@@ -771,11 +778,9 @@ struct Pass {
             for (const int number : b.touching[strip]) {
                 const int s = model_of(number, first_face);
                 Face face{{}, s, number - first_face[s]};
-                Screen screen;
                 Point corners[most_corners];
-                const int n = corners_of(face, screen, corners);
+                const int n = corners_of(face, shader(s, thread), corners);
                 bound(corners, n, width, height, face);
-                if (planes(screen, face).front_facing && drawn == Faces::back) continue;
                 for (int k = 2; k < n; k++) {  // what has been cut is a fan of triangles
                     const Point* const abc[] = {&corners[0], &corners[k - 1], &corners[k]};
                     covered = covered + triangle(face, abc, y_begin, y_end, depth, w);
@@ -796,7 +801,8 @@ struct Pass {
         const Point &a = *abc[0], &b = *abc[1], &c = *abc[2];
         constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
         const wide area = (wide{b.x} - a.x) * (wide{c.y} - a.y) - (wide{b.y} - a.y) * (wide{c.x} - a.x);
-        if (area == 0) return 0;
+        if (area == 0 || (area > 0 && drawn == Faces::back)) return 0;
+        const DepthPlane plane = depth_plane(a, b, c, static_cast<double>(area), face);
         const Point* const corner[] = {&a, area < 0 ? &c : &b, area < 0 ? &b : &c, &a};  // counterclockwise
         const int y_first = std::max(y_begin, face.ymin), y_last = std::min(y_end, face.ymax + 1) - 1;
         const wide first_x = face.xmin / lanes * lanes * one + half, first_y = y_first * one + half;
@@ -808,11 +814,11 @@ struct Pass {
             edges[i] = {(dx * (first_y - p.y) - dy * (first_x - p.x) - !top_left) >> subpixel_bits, -dy, dx};
         }
 
-        const coord zx = face.zx, zmin = face.zmin, zmax = face.zmax;
+        const coord zx = plane.zx, zmin = face.zmin, zmax = face.zmax;
         const pack<std::int32_t> mark(static_cast<int>(w.faces.size()));
         std::int32_t* const nearest = picture ? w.nearest.data() : nullptr;
         const auto visit = [&, row_length = std::ptrdiff_t{stride}](int x0, int y, const mask& inside) {
-            const coord z_row = face.zy * (y - face.ymin) + face.z0;
+            const coord z_row = plane.zy * (y - face.ymin) + plane.z0;
             const std::ptrdiff_t at = row_length * (y - y_begin) + x0;
             const real z = to_real(min(max(zx * (lane_coords + (x0 - face.xmin)) + z_row, zmin), zmax));
             const real old = real::load(depth + at);
@@ -857,12 +863,10 @@ struct Pass {
 
     // Makes the shader write the varyings of a face.
     Barycentric start(const Face& face, IShader& own) const {
-        Screen screen;
-        Point corners[most_corners];
         for (int i = 0; i < 3; i++) own.varying(face.iface, i);
-        corners_of(face, screen, corners);
-        Coverage c = face;
-        return planes(screen, c);
+        Screen screen = homogeneous(face, own);
+        measure(screen);
+        return planes(screen, face);
     }
 
     void color_lanes(const Face& face, const Barycentric& b, const IShader& own, const std::int32_t* xs,
@@ -871,7 +875,7 @@ struct Pass {
         const coord dx = x - face.xmin, dy = y - face.ymin;
         Fragment f;
         f.face = face.iface, f.front_facing = b.front_facing;
-        f.screen = {x + .5, y + .5, min(max(face.zx * dx + (face.zy * dy + face.z0), face.zmin), face.zmax)};
+        f.screen = {x + .5, y + .5, min(max(b.zx * dx + (b.zy * dy + b.z0), face.zmin), face.zmax)};
         // Coverage is snapped, so a sample may lie outside of the face by a hair: it stays on it.
         for (int i = 0; i < 3; i++) f.bar[i] = max(b.ex[i] * dx + (b.ey[i] * dy + b.e0[i]), 0.);
         const coord sum = f.bar.x + f.bar.y + f.bar.z, share = 1 / sum;
@@ -912,7 +916,7 @@ Counters draw(const Shaders& shader, int nshaders, const mat4& Viewport, TGAImag
 //   lower, half. What is one texel thin, with nothing on either side, may fall without end: it throws no shadow.
 //
 // And rounding: depths are floats, which are off by half a unit in the last place, 2^-25 of them, at most (below 2048,
-// where nearly all are, by that of 2048); coverage is snapped by half a sub-pixel.
+// where nearly all are, by that of 2048); corners are snapped by half a sub-pixel.
 coord derived_bias(const DepthBuffer& shadowbuffer, const vec<3, coord>& sb_p, const coord& stored, const vec2& slope) {
     const vec<2, coord> to_centre{floor(sb_p.x) + .5 - sb_p.x, floor(sb_p.y) + .5 - sb_p.y};
     const double snapping = (std::fabs(slope.x) + std::fabs(slope.y)) / (2 << subpixel_bits);
