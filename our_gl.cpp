@@ -653,15 +653,17 @@ INLINED pack<std::int32_t> for_each_in_spans(const Box& c, const Edge (&edges)[3
 
 // ---- drawing ----
 
-struct Face : Box {
+struct Face {
     int shader, iface;
+    int vertex[3];  // among all
 };
+struct FaceInBox : Face, Box {};
 
 constexpr std::int32_t to_be_clipped = INT32_MIN;  // the x of a vertex that is not within the guard band
 
 // Some consecutive faces, looked at by one thread.
 struct Block {
-    std::vector<std::vector<int>> touching;  // the numbers of those that touch a strip
+    std::vector<std::vector<Face>> touching;  // those that touch a strip
     Counters count;
 };
 
@@ -669,7 +671,7 @@ struct Block {
 struct Workspace {
     std::vector<float> depth;
     std::vector<std::int32_t> nearest;  // which of the faces is nearest at each pixel, -1 for none
-    std::vector<Face> faces;
+    std::vector<FaceInBox> faces;
     Counters count;
 };
 
@@ -713,11 +715,14 @@ struct Pass {
         blocks.resize(parts(first_face));
         for (Block& b : blocks) {
             b.touching.resize(strips), b.count = {};
-            for (std::vector<int>& faces : b.touching) faces.clear();
+            for (std::vector<Face>& faces : b.touching) faces.clear();
         }
         in_parts(first_face, [this](int part, int s, int begin, int end, int thread) {
             const IShader& own = shader(s, thread);
-            for (int i = begin; i < end; i++) sort_into_strips({{}, s, i}, own, blocks[part]);
+            for (int i = begin; i < end; i++) {
+                const auto vertex = [&](int k) { return first_vertex[s] + own.model.corner(i, k).vert; };
+                sort_into_strips({s, i, {vertex(0), vertex(1), vertex(2)}}, own, blocks[part]);
+            }
         });
         spaces.resize(thread_count());
         for (Workspace& w : spaces) w.count = {};
@@ -737,7 +742,7 @@ struct Pass {
 
     Screen homogeneous(const Face& face, const IShader& own) const {
         Screen s;
-        for (int i = 0; i < 3; i++) s.corner[i] = Viewport * own.vertex(own.model.corner(face.iface, i).vert);
+        for (int i = 0; i < 3; i++) s.corner[i] = Viewport * own.vertex(face.vertex[i] - first_vertex[face.shader]);
         return s;
     }
 
@@ -745,7 +750,7 @@ struct Pass {
     int corners_of(const Face& face, const IShader& own, Point (&corners)[most_corners]) const {
         bool inside = true;
         for (int i = 0; i < 3; i++) {
-            corners[i] = vertices[first_vertex[face.shader] + own.model.corner(face.iface, i).vert];
+            corners[i] = vertices[face.vertex[i]];
             inside = inside && corners[i].x != to_be_clipped;
         }
         if (inside) return 3;
@@ -763,7 +768,7 @@ struct Pass {
             const bool beside = c.xmin >= width || c.ymin >= height || c.xmax < 0 || c.ymax < 0;
             (beside ? block.count.outside : block.count.between_samples)++;
         } else for (int s = c.ymin / strip_rows; s <= c.ymax / strip_rows; s++)
-            block.touching[s].push_back(first_face[face.shader] + face.iface);
+            block.touching[s].push_back(face);
     }
 
     void draw_strip(int strip, int thread) const {
@@ -775,11 +780,10 @@ struct Pass {
         if (picture) w.nearest.assign(cells, -1), w.faces.clear();
         pack<std::int32_t> covered = 0;
         for (const Block& b : blocks)
-            for (const int number : b.touching[strip]) {
-                const int s = model_of(number, first_face);
-                Face face{{}, s, number - first_face[s]};
+            for (const Face& each : b.touching[strip]) {
+                FaceInBox face{each, {}};
                 Point corners[most_corners];
-                const int n = corners_of(face, shader(s, thread), corners);
+                const int n = corners_of(face, shader(face.shader, thread), corners);
                 bound(corners, n, width, height, face);
                 for (int k = 2; k < n; k++) {  // what has been cut is a fan of triangles
                     const Point* const abc[] = {&corners[0], &corners[k - 1], &corners[k]};
@@ -795,8 +799,8 @@ struct Pass {
     }
 
     // Draws a triangle of a face into the rows of a strip. Returns the number of samples in each lane.
-    pack<std::int32_t> triangle(const Face& face, const Point* const (&abc)[3], int y_begin, int y_end, float* depth,
-                                Workspace& w) const {
+    pack<std::int32_t> triangle(const FaceInBox& face, const Point* const (&abc)[3], int y_begin, int y_end,
+                                float* depth, Workspace& w) const {
         using wide = std::int64_t;
         const Point &a = *abc[0], &b = *abc[1], &c = *abc[2];
         constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
@@ -835,7 +839,7 @@ struct Pass {
     // number.
     long shade(int mark, int thread, int y_begin, int y_end) const {
         const Workspace& w = spaces[thread];
-        const Face& face = w.faces[mark];
+        const FaceInBox& face = w.faces[mark];
         IShader& own = shader(face.shader, thread);
         constexpr int most = 32 * lanes;  // pixels that are collected before they are coloured
         std::int32_t xs[most], ys[most];
@@ -862,14 +866,14 @@ struct Pass {
     }
 
     // Makes the shader write the varyings of a face.
-    Barycentric start(const Face& face, IShader& own) const {
+    Barycentric start(const FaceInBox& face, IShader& own) const {
         for (int i = 0; i < 3; i++) own.varying(face.iface, i);
         Screen screen = homogeneous(face, own);
         measure(screen);
         return planes(screen, face);
     }
 
-    void color_lanes(const Face& face, const Barycentric& b, const IShader& own, const std::int32_t* xs,
+    void color_lanes(const FaceInBox& face, const Barycentric& b, const IShader& own, const std::int32_t* xs,
                      const std::int32_t* ys, int n) const {
         const coord x = to_coord(pack<std::int32_t>::load(xs)), y = to_coord(pack<std::int32_t>::load(ys));
         const coord dx = x - face.xmin, dy = y - face.ymin;
