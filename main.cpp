@@ -499,7 +499,7 @@ static void prepare_folder(const Arguments& opt) {
     std::filesystem::create_directories(opt.out, error);
     if (error) throw std::runtime_error(opt.out.string() + ": cannot be made: " + error.message());
     const auto try_file = [&](const char* name) {  // what is written goes again, since nothing commits it
-        TGAFile(TGAImage(1, 1, TGAImage::GRAYSCALE), opt.out / name).write();
+        TGAFile(TGAImage(1, 1, TGAImage::GRAYSCALE), opt.out / name);
     };
     if (opt.method == Options::Method::map && opt.only != Arguments::Only::framebuffer) try_file("depth.tga");
     if (opt.only != Arguments::Only::depth) try_file("framebuffer.tga");
@@ -515,8 +515,6 @@ static std::string write(const Arguments& opt, const Shadow& shadow, const TGAIm
             files[i].emplace(depth_picture(shadow.shadowbuffer, shadow.aspect), paths[i]);
         if (i == 1 && opt.only != Arguments::Only::depth) files[i].emplace(frame, paths[i]);
     });
-    for (auto& file : files)
-        if (file) file->write();
     std::string written;
     for (int i = 0; i < 2; i++) {
         if (files[i]) {

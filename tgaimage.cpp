@@ -325,9 +325,7 @@ Byte* encode_row(const Byte* row, int width, Byte* dst) {
 }  // namespace
 
 void TGAImage::write_tga_file(const fs::path& path, bool rle) const {
-    TGAFile file(*this, path, rle);
-    file.write();
-    file.commit();
+    TGAFile(*this, path, rle).commit();
 }
 
 static std::pair<int, int> terminal_size() {  // columns and rows, 0 where there is none
@@ -449,18 +447,6 @@ TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(
                                       byte(w), byte(w >> 8), byte(h), byte(h >> 8), byte(bpp * 8), byte(descriptor)};
     // Extension area and developer directory at 0, that is none, then the signature and a zero byte, the literal's own.
     constexpr char footer[] = "\0\0\0\0\0\0\0\0TRUEVISION-XFILE.";
-    // A run saves at least the header of the raw packet before it, so that a row takes at most its own bytes and a
-    // header for each 128 pixels.
-    const std::size_t most_of_row = w * bpp + (w + longest_packet - 1) / longest_packet;
-    bytes_ = std::make_unique_for_overwrite<Byte[]>(sizeof header + h * most_of_row + sizeof footer);
-    constexpr decltype(&encode_row<1>) encoders[] = {nullptr, encode_row<1>, nullptr, encode_row<3>, encode_row<4>};
-    Byte* end = std::copy_n(header, sizeof header, bytes_.get());
-    for (int y = h - 1; y >= 0; y--)
-        end = rle ? encoders[bpp](image.pixel(0, y), w, end) : std::copy_n(image.pixel(0, y), w * bpp, end);
-    size_ = std::copy_n(footer, sizeof footer, end) - bytes_.get();
-}
-
-void TGAFile::write() {
     std::error_code error;
     const fs::file_status status = fs::status(path_, error);
     // Renaming would put the picture in the place of a device.
@@ -471,7 +457,22 @@ void TGAFile::write() {
     if (!stream) fail(path_, reason());
     temporary_.path = temporary;
     errno = 0;
-    if (std::fwrite(bytes_.get(), size_, 1, stream.get()) != 1) fail(path_, reason());
+    // A run saves at least the header of the raw packet before it, so that a row takes at most its own bytes and a
+    // header for each 128 pixels. Some rows at a time: fresh memory for all would take longer than to encode them.
+    const std::size_t most_of_row = w * bpp + (w + longest_packet - 1) / longest_packet, piece = 1 << 16;
+    const auto bytes = std::make_unique_for_overwrite<Byte[]>(piece + most_of_row + sizeof footer);
+    constexpr decltype(&encode_row<1>) encoders[] = {nullptr, encode_row<1>, nullptr, encode_row<3>, encode_row<4>};
+    Byte* end = std::copy_n(header, sizeof header, bytes.get());
+    const auto put = [&] {
+        if (std::fwrite(bytes.get(), end - bytes.get(), 1, stream.get()) != 1) fail(path_, reason());
+        end = bytes.get();
+    };
+    for (int y = h - 1; y >= 0; y--) {
+        end = rle ? encoders[bpp](image.pixel(0, y), w, end) : std::copy_n(image.pixel(0, y), w * bpp, end);
+        if (end >= bytes.get() + piece) put();
+    }
+    end = std::copy_n(footer, sizeof footer, end);
+    put();
     if (std::fclose(stream.release())) fail(path_, reason());  // flushes what is left
 }
 

@@ -109,15 +109,13 @@ public:
     static void progress(int done, int all);
 };
 
-// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. It is made in memory
-// of the picture's bytes at most, one more for each 128 pixels of a row, and 44. write() puts all of them into a
-// temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one, never half of
-// one. Without commit() the temporary file goes with the object. Of several pictures, commit the first when all are
-// written: where one does not fit on the disk, none is replaced. Throws std::runtime_error "FILE: what".
+// A picture on its way to PATH: the top row first, with the 2.0 footer, run-length encoded or not. The constructor
+// writes it into a temporary file beside PATH; commit() renames that, so PATH is either the old picture or the new one,
+// never half of one. Without commit() the temporary file goes with the object. Of several pictures, commit the first
+// when all are written: where one does not fit on the disk, none is replaced. Throws std::runtime_error "FILE: what".
 class TGAFile {
 public:
     TGAFile(const TGAImage& image, const std::filesystem::path& path, bool rle = true);
-    void write();
     void commit();
 
 private:
@@ -128,7 +126,5 @@ private:
         ~Temporary();
     };
     std::filesystem::path path_;
-    std::unique_ptr<std::uint8_t[]> bytes_;
-    std::size_t size_;
     Temporary temporary_;
 };
