@@ -12,6 +12,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -31,6 +32,21 @@
 
 namespace fs = std::filesystem;
 using Byte = std::uint8_t;
+
+#if defined(MADV_HUGEPAGE) && !defined(UMBRA_SANITIZE)
+// Large arrays in pages of 2 MB, as many as they fill to an eighth: to touch fresh memory in pages of 4 KB takes longer
+// than to fill it, a quarter of a whole run on 2500 faces and a third on 2.5 million. Weak: a program may have others.
+[[gnu::weak]] void* operator new(std::size_t n) {
+    constexpr std::size_t page = 1 << 21;
+    const std::size_t large = (n + page / 8) / page * page;
+    void* const p = large ? std::aligned_alloc(page, (n + page - 1) / page * page) : std::malloc(n ? n : 1);
+    if (!p) throw std::bad_alloc();
+    if (large) madvise(p, large, MADV_HUGEPAGE);
+    return p;
+}
+[[gnu::weak]] void operator delete(void* p) noexcept { std::free(p); }
+[[gnu::weak]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+#endif
 
 namespace {
 
@@ -459,8 +475,9 @@ TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(
     errno = 0;
     // A run saves at least the header of the raw packet before it, so that a row takes at most its own bytes and a
     // header for each 128 pixels. Some rows at a time: fresh memory for all would take longer than to encode them.
-    const std::size_t most_of_row = w * bpp + (w + longest_packet - 1) / longest_packet, piece = 1 << 16;
-    const auto bytes = std::make_unique_for_overwrite<Byte[]>(piece + most_of_row + sizeof footer);
+    const std::size_t most_of_row = w * bpp + (w + longest_packet - 1) / longest_packet;
+    const std::size_t piece = std::min<std::size_t>(h * most_of_row, 1 << 16);
+    const auto bytes = std::make_unique_for_overwrite<Byte[]>(sizeof header + piece + most_of_row + sizeof footer);
     constexpr decltype(&encode_row<1>) encoders[] = {nullptr, encode_row<1>, nullptr, encode_row<3>, encode_row<4>};
     Byte* end = std::copy_n(header, sizeof header, bytes.get());
     const auto put = [&] {
