@@ -485,6 +485,7 @@ int clip(const Screen& s, int width, int height, Point (&corners)[most_corners])
 struct Box {
     int xmin, xmax, ymin, ymax;
     bool is_small;  // at most small_box pixels wide and high
+    bool is_cut;    // the face has been clipped
     double zmin, zmax;
 };
 
@@ -746,14 +747,20 @@ struct Pass {
         return s;
     }
 
+    Barycentric planes_of(const FaceInBox& face, const IShader& own) const {
+        Screen screen = homogeneous(face, own);
+        measure(screen);
+        return planes(screen, face);
+    }
+
     // The corners of what is left of a face after clipping. Returns how many these are.
-    int corners_of(const Face& face, const IShader& own, Point (&corners)[most_corners]) const {
-        bool inside = true;
+    int corners_of(const Face& face, const IShader& own, Point (&corners)[most_corners], bool& is_cut) const {
+        is_cut = false;
         for (int i = 0; i < 3; i++) {
             corners[i] = vertices[face.vertex[i]];
-            inside = inside && corners[i].x != to_be_clipped;
+            is_cut = is_cut || corners[i].x == to_be_clipped;
         }
-        if (inside) return 3;
+        if (!is_cut) return 3;
         Screen screen = homogeneous(face, own);
         return measure(screen) && !is_outside(screen, width, height) ? clip(screen, width, height, corners) : 0;
     }
@@ -761,7 +768,7 @@ struct Pass {
     void sort_into_strips(const Face& face, const IShader& own, Block& block) const {
         Point corners[most_corners];
         Box c;
-        const int n = corners_of(face, own, corners);
+        const int n = corners_of(face, own, corners, c.is_cut);
         block.count.triangles++;
         if (n == 0) block.count.outside++;
         else if (!bound(corners, n, width, height, c)) {
@@ -782,12 +789,13 @@ struct Pass {
         for (const Block& b : blocks)
             for (const Face& each : b.touching[strip]) {
                 FaceInBox face{each, {}};
+                const IShader& own = shader(face.shader, thread);
                 Point corners[most_corners];
-                const int n = corners_of(face, shader(face.shader, thread), corners);
+                const int n = corners_of(face, own, corners, face.is_cut);
                 bound(corners, n, width, height, face);
                 for (int k = 2; k < n; k++) {  // what has been cut is a fan of triangles
                     const Point* const abc[] = {&corners[0], &corners[k - 1], &corners[k]};
-                    covered = covered + triangle(face, abc, y_begin, y_end, depth, w);
+                    covered = covered + triangle(face, own, abc, y_begin, y_end, depth, w);
                 }
                 if (picture) w.faces.push_back(face);
             }
@@ -799,14 +807,16 @@ struct Pass {
     }
 
     // Draws a triangle of a face into the rows of a strip. Returns the number of samples in each lane.
-    pack<std::int32_t> triangle(const FaceInBox& face, const Point* const (&abc)[3], int y_begin, int y_end,
-                                float* depth, Workspace& w) const {
+    pack<std::int32_t> triangle(const FaceInBox& face, const IShader& own, const Point* const (&abc)[3], int y_begin,
+                                int y_end, float* depth, Workspace& w) const {
         using wide = std::int64_t;
         const Point &a = *abc[0], &b = *abc[1], &c = *abc[2];
         constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
         const wide area = (wide{b.x} - a.x) * (wide{c.y} - a.y) - (wide{b.y} - a.y) * (wide{c.x} - a.x);
         if (area == 0 || (area > 0 && drawn == Faces::back)) return 0;
-        const DepthPlane plane = depth_plane(a, b, c, static_cast<double>(area), face);
+        // Where a face has been cut, depths are 1e9 times as large as in the picture.
+        const DepthPlane plane =
+            face.is_cut ? planes_of(face, own) : depth_plane(a, b, c, static_cast<double>(area), face);
         const Point* const corner[] = {&a, area < 0 ? &c : &b, area < 0 ? &b : &c, &a};  // counterclockwise
         const int y_first = std::max(y_begin, face.ymin), y_last = std::min(y_end, face.ymax + 1) - 1;
         const wide first_x = face.xmin / lanes * lanes * one + half, first_y = y_first * one + half;
@@ -868,9 +878,7 @@ struct Pass {
     // Makes the shader write the varyings of a face.
     Barycentric start(const FaceInBox& face, IShader& own) const {
         for (int i = 0; i < 3; i++) own.varying(face.iface, i);
-        Screen screen = homogeneous(face, own);
-        measure(screen);
-        return planes(screen, face);
+        return planes_of(face, own);
     }
 
     void color_lanes(const FaceInBox& face, const Barycentric& b, const IShader& own, const std::int32_t* xs,
