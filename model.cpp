@@ -199,7 +199,7 @@ public:
         verts.reserve(bytes / 96), uvs.reserve(bytes / 96), normals.reserve(bytes / 96), corners.reserve(bytes / 32);
         const char* kept = text.begin;
         for (; !is_done(); next_line()) {
-            if (at_ - kept > 1 << 24) text.forget_before(kept = at_);  // else all of it is held at once
+            if (at_ - kept > 1 << 22) text.forget_before(kept = at_);  // else all of it is held at once
             if (skip_word("v")) vertex();
             else if (skip_word("vt")) uvs.push_back(vector<2>(1));
             else if (skip_word("vn")) normals.push_back(normalized(vector<3>(3)));
