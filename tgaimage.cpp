@@ -393,6 +393,7 @@ void TGAImage::print() const {
 
 #if __has_include(<termios.h>)
 static termios before;  // how the terminal was: here, for the handler of a signal
+static int resized[2];  // a pipe: what a handler writes wakes key(), even if it comes before that waits
 
 // What a handler may call: no more than that.
 static void restore() {
@@ -403,13 +404,14 @@ static void restore() {
 
 Terminal::Terminal() {
     if (!isatty(1) || tcgetattr(0, &before)) throw std::runtime_error("standard input and output are no terminal");
+    if (pipe(resized)) throw std::runtime_error("no pipe: " + reason());
     for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT})
         std::signal(number, [](int n) {
             restore();
             std::signal(n, SIG_DFL);
             std::raise(n);
         });
-    std::signal(SIGWINCH, [](int) {});  // wakes key()
+    std::signal(SIGWINCH, [](int) { [[maybe_unused]] const auto written = ::write(resized[1], "", 1); });
     termios raw = before;
     raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     raw.c_cc[VSUSP] = _POSIX_VDISABLE;  // nothing would restore it
@@ -421,12 +423,15 @@ Terminal::~Terminal() {
     std::fflush(stdout);
     restore();
     for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGWINCH}) std::signal(number, SIG_DFL);
+    for (const int end : resized) ::close(end);
 }
 
 char Terminal::key(int milliseconds) const {
-    pollfd input{0, POLLIN, 0};
-    if (poll(&input, 1, milliseconds) <= 0) return 0;
+    pollfd inputs[] = {{0, POLLIN, 0}, {resized[0], POLLIN, 0}}, &input = inputs[0];
+    while (poll(inputs, 2, milliseconds) < 0 && errno == EINTR) {}
     char bytes[3] = {};
+    if (char all[64]; inputs[1].revents && ::read(resized[0], all, sizeof all) > 0) return 0;
+    if (!input.revents) return 0;
     if (::read(0, bytes, 1) <= 0) return 'q';
     if (bytes[0] != '\033') return bytes[0];
     if (poll(&input, 1, 0) <= 0 || ::read(0, bytes + 1, 2) < 2 || bytes[2] < 'A' || bytes[2] > 'D') return 0;
