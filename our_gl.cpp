@@ -814,7 +814,7 @@ struct Pass {
         constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
         const wide area = (wide{b.x} - a.x) * (wide{c.y} - a.y) - (wide{b.y} - a.y) * (wide{c.x} - a.x);
         if (area == 0 || (area > 0 && drawn == Faces::back)) return 0;
-        // Where a face has been cut, depths are 1e9 times as large as in the picture.
+        // Where a face has been cut its depths reach screen_depth / 2 / w_near, 4e9: half a sub-pixel changes too much.
         const DepthPlane plane =
             face.is_cut ? planes_of(face, own) : depth_plane(a, b, c, static_cast<double>(area), face);
         const Point* const corner[] = {&a, area < 0 ? &c : &b, area < 0 ? &b : &c, &a};  // counterclockwise
