@@ -454,6 +454,8 @@ struct Point {
     double z;
 };
 
+constexpr std::int32_t to_be_clipped = INT32_MIN;  // the x of a vertex that is not within the guard band
+
 INLINED Point snapped(const vec4& s, int width, int height) {
     constexpr double one = 1 << subpixel_bits;
     const vec3 p = project(s);
@@ -510,6 +512,40 @@ INLINED bool bound(const Point* corners, int n, int width, int height, Box& c) {
     c.xmax = std::min(width - 1, (high.x - half) >> subpixel_bits);
     c.ymax = std::min(height - 1, (high.y - half) >> subpixel_bits);
     return c.xmin <= c.xmax && c.ymin <= c.ymax;
+}
+
+// Which of the faces [first,end), one a lane, cover no pixel's centre: there is none in their box, or one that lies
+// outside of them. A dense mesh is made of these, and to find them side by side takes .8 of the time.
+INLINED mask cover_nothing(const Model& model, const Point* vertices, int first, int end) {
+    using Lanes = pack<std::int32_t>;
+    constexpr std::int32_t one = 1 << subpixel_bits, half = one / 2;
+    Lanes x[3], y[3];
+    for (int k = 0; k < 3; k++) {
+        std::int32_t xs[lanes], ys[lanes];
+        for (int i = 0; i < lanes; i++) {
+            const Point& p = vertices[model.corner(std::min(first + i, end - 1), k).vert];
+            xs[i] = p.x, ys[i] = p.y;
+        }
+        x[k] = Lanes(xs), y[k] = Lanes(ys);
+    }
+    const auto pixel = [](Lanes a) {
+        a.p[0] >>= subpixel_bits;
+        return a;
+    };
+    const auto lowest = [&](const Lanes (&a)[3]) { return pixel(min(min(a[0], a[1]), a[2]) + (half - 1)); };
+    const auto highest = [&](const Lanes (&a)[3]) { return pixel(max(max(a[0], a[1]), a[2]) + half) - 1; };
+    const Lanes xmin = lowest(x), xmax = highest(x), ymin = lowest(y), ymax = highest(y);
+    // Twice the areas that this one centre has with the edges: exact, since it is less than a pixel from each corner.
+    coord dx[3], dy[3];
+    for (int k = 0; k < 3; k++) {
+        dx[k] = to_coord(x[k]) - to_coord(xmin * one + half);
+        dy[k] = to_coord(y[k]) - to_coord(ymin * one + half);
+    }
+    const auto area2 = [&](int i, int j) { return dx[i] * dy[j] - dy[i] * dx[j]; };
+    const coord u = area2(1, 2), v = area2(2, 0), w = area2(0, 1);
+    const mask is_one = (xmin == xmax) & (ymin == ymax), is_beside = (min(min(u, v), w) < 0) & (max(max(u, v), w) > 0);
+    const mask is_cut = (x[0] == to_be_clipped) | (x[1] == to_be_clipped) | (x[2] == to_be_clipped);
+    return ((xmin > xmax) | (ymin > ymax) | (is_one & is_beside)) & !is_cut;
 }
 
 // Depth is linear on the screen: zx (x - xmin) + zy (y - ymin) + z0 at the centre of the pixel (x,y), where (xmin,ymin)
@@ -660,8 +696,6 @@ struct Face {
 };
 struct FaceInBox : Face, Box {};
 
-constexpr std::int32_t to_be_clipped = INT32_MIN;  // the x of a vertex that is not within the guard band
-
 // Some consecutive faces, looked at by one thread.
 struct Block {
     std::vector<std::vector<Face>> touching;  // those that touch a strip
@@ -720,10 +754,7 @@ struct Pass {
         }
         in_parts(first_face, [this](int part, int s, int begin, int end, int thread) {
             const IShader& own = shader(s, thread);
-            for (int i = begin; i < end; i++) {
-                const auto vertex = [&](int k) { return first_vertex[s] + own.model.corner(i, k).vert; };
-                sort_into_strips({s, i, {vertex(0), vertex(1), vertex(2)}}, own, blocks[part]);
-            }
+            sort_into_strips(s, begin, end, own, blocks[part]);
         });
         spaces.resize(thread_count());
         for (Workspace& w : spaces) w.count = {};
@@ -765,11 +796,24 @@ struct Pass {
         return measure(screen) && !is_outside(screen, width, height) ? clip(screen, width, height, corners) : 0;
     }
 
+    // The faces [begin,end) of the shader s.
+    void sort_into_strips(int s, int begin, int end, const IShader& own, Block& block) const {
+        block.count.triangles += end - begin;
+        for (int first = begin; first < end; first += lanes) {
+            std::int32_t none[lanes];
+            cover_nothing(own.model, &vertices[first_vertex[s]], first, end).m.store(none);
+            for (int i = first; i < std::min(first + lanes, end); i++) {
+                const auto vertex = [&](int k) { return first_vertex[s] + own.model.corner(i, k).vert; };
+                if (none[i - first]) block.count.between_samples++;
+                else sort_into_strips({s, i, {vertex(0), vertex(1), vertex(2)}}, own, block);
+            }
+        }
+    }
+
     void sort_into_strips(const Face& face, const IShader& own, Block& block) const {
         Point corners[most_corners];
         Box c;
         const int n = corners_of(face, own, corners, c.is_cut);
-        block.count.triangles++;
         if (n == 0) block.count.outside++;
         else if (!bound(corners, n, width, height, c)) {
             const bool beside = c.xmin >= width || c.ymin >= height || c.xmax < 0 || c.ymax < 0;

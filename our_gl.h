@@ -234,7 +234,7 @@ struct SkyShader final : IShader {
 struct Counters {
     long triangles = 0;        // faces handed in
     long outside = 0;          // ... of which beyond all pixels' centres on one side, or behind the eye
-    long between_samples = 0;  // ... of which between the pixels' centres
+    long between_samples = 0;  // ... of which small, and beside or between the pixels' centres
     long covered = 0;          // samples inside of a face: depth tests
     long shaded = 0;           // pixels that fragment() coloured: each visible one once
     Counters& operator+=(const Counters& c);

@@ -71,7 +71,7 @@ std::vector<Figures> sentences() {
         {"the idol's {} in the default view", {said("pixels")}},
         {"leaves out {} of {} calls of `fragment`", {hidden, covered}},
         {"others: {} of {}; {} vertices placed, not {} corners", {hidden, covered, vertices, 3 * triangles}},
-        {"{} of {} faces, which lie between", {said("between_samples", "build/umbra --size 100"), triangles}},
+        {"{} of {} faces, which cover no pixel", {said("between_samples", "build/umbra --size 100"), triangles}},
         {"the light's pass and its buffer of {.2} MB", {said("shadow_bytes") / 1e6}},
         {"is the bust above: {} triangles", {triangles}},
         {"{.2} % of what faces the light is falsely lit, {.2} % falsely dark", {stod(bias[3]), stod(bias[2])}},
