@@ -57,7 +57,6 @@ struct pack {
     pack() = default;
     template <class S> requires std::is_arithmetic_v<S>
     INLINED pack(S s) { for (part& each : p) each = static_cast<T>(s) - part{}; }
-    INLINED explicit pack(const T (&values)[lanes]) { *this = load(values); }
     INLINED static pack load(const T* from) {  // by registers: what is copied in smaller pieces waits in memory
         pack out;
         for (int i = 0; i < parts; i++) std::memcpy(&out.p[i], from + lanes / parts * i, sizeof(part));
@@ -72,25 +71,23 @@ struct pack {
         return values[i];
     }
 
-#define LANEWISE(op)                                                       \
-    INLINED friend pack operator op(const pack& a, const pack& b) {        \
-        pack out;                                                          \
-        for (int i = 0; i < parts; i++) out.p[i] = a.p[i] op b.p[i];       \
-        return out;                                                        \
+#define LANEWISE(function, result)                                     \
+    INLINED friend pack function(const pack& a, const pack& b) {       \
+        pack out;                                                      \
+        for (int i = 0; i < parts; i++) out.p[i] = result;             \
+        return out;                                                    \
     }
-    LANEWISE(+) LANEWISE(-) LANEWISE(*) LANEWISE(/)
+    LANEWISE(operator+, a.p[i] + b.p[i])
+    LANEWISE(operator-, a.p[i] - b.p[i])
+    LANEWISE(operator*, a.p[i] * b.p[i])
+    LANEWISE(operator/, a.p[i] / b.p[i])
+    LANEWISE(operator&, a.p[i] & b.p[i])
+    LANEWISE(operator|, a.p[i] | b.p[i])
+    LANEWISE(operator>>, a.p[i] >> b.p[i])
+    LANEWISE(min, b.p[i] < a.p[i] ? b.p[i] : a.p[i])  // as std::min, also of a NaN
+    LANEWISE(max, a.p[i] < b.p[i] ? b.p[i] : a.p[i])
 #undef LANEWISE
     INLINED friend pack operator-(const pack& a) { return pack(-0.) - a; }
-    INLINED friend pack min(const pack& a, const pack& b) {  // as std::min, also of a NaN
-        pack out;
-        for (int i = 0; i < parts; i++) out.p[i] = b.p[i] < a.p[i] ? b.p[i] : a.p[i];
-        return out;
-    }
-    INLINED friend pack max(const pack& a, const pack& b) {
-        pack out;
-        for (int i = 0; i < parts; i++) out.p[i] = a.p[i] < b.p[i] ? b.p[i] : a.p[i];
-        return out;
-    }
 };
 
 using real = pack<float>;
@@ -130,18 +127,9 @@ struct mask {
     INLINED mask(bool b) : m(b ? -1 : 0) {}
     INLINED explicit mask(const pack<std::int32_t>& a) : m(a) {}
     INLINED bool operator[](int i) const { return m[i] != 0; }
-    INLINED friend mask operator!(mask a) {
-        a.m.p[0] = ~a.m.p[0];
-        return a;
-    }
-    INLINED friend mask operator&(mask a, const mask& b) {
-        a.m.p[0] &= b.m.p[0];
-        return a;
-    }
-    INLINED friend mask operator|(mask a, const mask& b) {
-        a.m.p[0] |= b.m.p[0];
-        return a;
-    }
+    INLINED friend mask operator!(const mask& a) { return mask(-1 - a.m); }
+    INLINED friend mask operator&(const mask& a, const mask& b) { return mask(a.m & b.m); }
+    INLINED friend mask operator|(const mask& a, const mask& b) { return mask(a.m | b.m); }
 };
 
 INLINED bool any(const mask& a) {
@@ -179,7 +167,7 @@ INLINED pack<T> looked_up(const pack<Index>& numbers, F&& look_up, std::integer_
     Index at[lanes];
     numbers.store(at);
     const T values[]{look_up(at[i])...};
-    return pack<T>(values);
+    return pack<T>::load(values);
 }
 template <class T, class Index, class F>
 INLINED pack<T> looked_up(const pack<Index>& numbers, F&& look_up) {
@@ -192,7 +180,7 @@ INLINED pack<T> each(const pack<T>& a, F&& f) {
     T values[lanes];
     a.store(values);
     for (T& v : values) v = f(v);
-    return pack<T>(values);
+    return pack<T>::load(values);
 }
 INLINED real sqrt(const real& a) { return each(a, [](float v) { return std::sqrt(v); }); }
 INLINED coord sqrt(const coord& a) { return each(a, [](double v) { return std::sqrt(v); }); }
@@ -328,7 +316,7 @@ INLINED vec<n, pack<T>> normalized(const vec<n, pack<T>>& v) {
             one = normalized(one);
             for (int i = 0; i < n; i++) lane[i][l] = one[i];
         }
-        for (int i = 0; i < n; i++) unit[i] = pack<T>(lane[i]);
+        for (int i = 0; i < n; i++) unit[i] = pack<T>::load(lane[i]);
     }
     return unit;
 }

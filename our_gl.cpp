@@ -454,7 +454,7 @@ struct Point {
     double z;
 };
 
-constexpr std::int32_t to_be_clipped = INT32_MIN;  // the x of a vertex that is not within the guard band
+constexpr std::int32_t to_be_clipped = INT32_MIN / 2;  // the x of a vertex that is not within the guard band
 
 INLINED Point snapped(const vec4& s, int width, int height) {
     constexpr double one = 1 << subpixel_bits;
@@ -526,15 +526,12 @@ INLINED mask cover_nothing(const Model& model, const Point* vertices, int first,
             const Point& p = vertices[model.corner(std::min(first + i, end - 1), k).vert];
             xs[i] = p.x, ys[i] = p.y;
         }
-        x[k] = Lanes(xs), y[k] = Lanes(ys);
+        x[k] = Lanes::load(xs), y[k] = Lanes::load(ys);
     }
-    const auto pixel = [](Lanes a) {
-        a.p[0] >>= subpixel_bits;
-        return a;
-    };
-    const auto lowest = [&](const Lanes (&a)[3]) { return pixel(min(min(a[0], a[1]), a[2]) + (half - 1)); };
-    const auto highest = [&](const Lanes (&a)[3]) { return pixel(max(max(a[0], a[1]), a[2]) + half) - 1; };
-    const Lanes xmin = lowest(x), xmax = highest(x), ymin = lowest(y), ymax = highest(y);
+    // As in bound(), but not limited to the picture.
+    const auto first_in = [](const Lanes (&a)[3]) { return (min(min(a[0], a[1]), a[2]) + half - 1) >> subpixel_bits; };
+    const auto last_in = [](const Lanes (&a)[3]) { return (max(max(a[0], a[1]), a[2]) - half) >> subpixel_bits; };
+    const Lanes xmin = first_in(x), xmax = last_in(x), ymin = first_in(y), ymax = last_in(y);
     // Twice the areas that this one centre has with the edges: exact, since it is less than a pixel from each corner.
     coord dx[3], dy[3];
     for (int k = 0; k < 3; k++) {
@@ -606,7 +603,7 @@ INLINED Barycentric planes(Screen& s, const Box& box) {
 const pack<std::int32_t> lane_numbers = [] {
     std::int32_t numbers[lanes];
     for (int i = 0; i < lanes; i++) numbers[i] = i;
-    return pack<std::int32_t>(numbers);
+    return pack<std::int32_t>::load(numbers);
 }();
 const coord lane_coords = to_coord(lane_numbers);
 

@@ -187,13 +187,9 @@ public:
             std::memcpy(&bytes, first + std::size_t{i} * bytespp, 4);
             return bytes;
         });
-        if (map->bytespp() == 1) bytes_.p[0] = (bytes_.p[0] & 255) * 0x10101;  // grey
+        if (map->bytespp() == 1) bytes_ = (bytes_ & 255) * 0x10101;  // grey
     }
-    INLINED real operator[](int channel) const {
-        pack<std::int32_t> value;
-        value.p[0] = bytes_.p[0] >> 8 * channel & 255;
-        return to_real(value);
-    }
+    INLINED real operator[](int channel) const { return to_real(bytes_ >> 8 * channel & 255); }
     INLINED Color bgr() const { return {(*this)[0], (*this)[1], (*this)[2]}; }
     INLINED vec<3, real> normal() const {  // (r,g,b) from [0,255] to [-1,1]
         return {(*this)[2] * (2 / 255.) - 1, (*this)[1] * (2 / 255.) - 1, (*this)[0] * (2 / 255.) - 1};
@@ -208,11 +204,8 @@ private:
 INLINED real power(real base, const real& exponent) {
     const pack<std::int32_t> e = to_int(exponent);
     real result = 1;
-    for (int bit = 1; bit < 256; bit *= 2, base = base * base) {
-        pack<std::int32_t> is_set;
-        is_set.p[0] = e.p[0] & bit;
-        result = select(is_set > 0, result * base, result);
-    }
+    for (int bit = 1; bit < 256; bit *= 2, base = base * base)
+        result = select((e & bit) > 0, result * base, result);
     return result;
 }
 

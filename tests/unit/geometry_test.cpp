@@ -110,7 +110,7 @@ static void compare_lanes(std::mt19937& rng) {
     for (T* each : {x, y})
         for (int i = 0; i < lanes; i++)
             each[i] = rng() % 2 ? T(rng()) / T(2147483648.) - 1 : special[rng() % std::size(special)];
-    const pack<T> a(x), b(y);
+    const auto a = pack<T>::load(x), b = pack<T>::load(y);
     bool some = false;
     for (int i = 0; i < lanes; i++) {
         const auto same = [&](const auto& got, auto want) {
@@ -128,7 +128,11 @@ static void compare_lanes(std::mt19937& rng) {
         } else {
             CHECK(same(sqrt(a), std::sqrt(x[i])) && same(to_coord(a), static_cast<double>(x[i])));
         }
-        if (std::fabs(x[i]) < 2147483648.) CHECK_EQ(to_int(a)[i], static_cast<std::int32_t>(x[i]));
+        if (std::fabs(x[i]) < 2147483648.) {
+            const auto n = static_cast<std::int32_t>(x[i]);
+            CHECK(to_int(a)[i] == n && (to_int(a) >> i)[i] == n >> i);
+            CHECK((to_int(a) & 12345)[i] == (n & 12345) && (to_int(a) | 12345)[i] == (n | 12345));
+        }
         some |= x[i] < y[i];
     }
     CHECK(any(a < b) == some);
@@ -153,7 +157,7 @@ TEST("vectors of lanes compute what vectors do") {
         for (auto& each : component)
             for (double& v : each)
                 v = (static_cast<double>(rng()) / 2147483648. - 1) * (k % 10 || rng() % 2 ? 1 : 1e-20);
-        const vec<3, coord> v{coord(component[0]), coord(component[1]), coord(component[2])};
+        const vec<3, coord> v{coord::load(component[0]), coord::load(component[1]), coord::load(component[2])};
         const auto lane = [](const auto& w, int i) {
             return vec<3, std::decay_t<decltype(w.x[i])>>{w.x[i], w.y[i], w.z[i]};
         };
