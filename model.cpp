@@ -53,7 +53,7 @@ char* find(char c, char* begin, char* end) { return static_cast<char*>(std::memc
 
 // A line that ends in '\' goes on in the next one; not where it holds a '#', since a stray '\' in a comment must not
 // swallow a vertex. Both bytes become blanks, the newline '\0', which no text has: so lines can still be counted.
-void join_lines(char* begin, char* end) {
+void join_lines(char* begin, char* end, const char* text_end) {
     for (char* p = begin; (p = find('\\', p, end)); p++) {
         char *newline = p + 1, *before = p;
         while (is_blank(*newline)) newline++;
@@ -61,7 +61,7 @@ void join_lines(char* begin, char* end) {
         while (before > begin && !std::strchr("#\n", before[-1])) before--;  // it finds '\0', too
         if (before > begin && before[-1] == '#') continue;
         *p = ' ';
-        if (newline + 1 < end) *newline = '\0';
+        if (newline + 1 < text_end) *newline = '\0';
     }
 }
 
@@ -71,37 +71,38 @@ constexpr std::pair<std::string_view, const char*> other_files[] = {
     {"\x1F\x8B", "gzip"}, {"PK\3\4", "ZIP"}, {"Kaydara FBX", "FBX"}, {"BLENDER", "Blender"},
     {"\xFF\xFE", "UTF-16"}, {"\xFE\xFF", "UTF-16"}, {"version https://git-lfs", "Git LFS pointer ('git lfs pull')"}};
 
-// A whole text file, its lines joined and each ended by '\n', the last one too.
+[[noreturn]] void refuse(const fs::path& path, const std::string& kind) {
+    throw std::runtime_error(path.string() + ": is a " + kind + " file, not a text of vertices and faces");
+}
+
+// A whole text file, each line ended by '\n', the last one too.
 FileBytes read_text(const fs::path& path) {
     FileBytes text = read_file(path, 1);
     const std::string_view all(text.begin, text.end);
-    const auto refuse = [&](const std::string& kind) {
-        throw std::runtime_error(path.string() + ": is a " + kind + " file, not a text of vertices and faces");
-    };
     for (const auto& [bytes, kind] : other_files)
-        if (all.starts_with(bytes)) refuse(kind);
+        if (all.starts_with(bytes)) refuse(path, kind);
     std::uint32_t faces = 0;  // of STL that is not text: 80 bytes, the number of faces, 50 bytes for each
     if (all.size() >= 84) std::memcpy(&faces, &all[80], 4);
-    if (all.size() == 84 + 50 * std::uint64_t{faces}) refuse("STL");
+    if (all.size() == 84 + 50 * std::uint64_t{faces}) refuse(path, "STL");
     while (text.end > text.begin && text.end[-1] == '\0') text.end--;  // some programs fill up their last block
     if (text.end == text.begin || text.end[-1] != '\n') *text.end++ = '\n';
-    if (find('\0', text.begin, text.end)) refuse("binary");
     if (all.starts_with("\xEF\xBB\xBF")) text.begin += 3;  // UTF-8's byte order mark
     // Lines that end in '\r' alone, if the first ones do.
     if (char* p = find('\r', text.begin, std::min(text.end, text.begin + 4096)); p && p[1] != '\n')
-        for (; p; p = find('\r', p + 1, text.end)) *p = p[1] == '\n' ? ' ' : '\n';
-    join_lines(text.begin, text.end);
+        for (text.is_mapped = false; p; p = find('\r', p + 1, text.end)) *p = p[1] == '\n' ? ' ' : '\n';  // all kept
     return text;
 }
 
-// Reads [BEGIN,END), a whole text or a part that ends with '\n', after join_lines. NAME is for messages.
+// Reads what read_text gives, some lines at a time. NAME is for messages.
 class Scanner {
 public:
-    Scanner(const fs::path& name, const FileBytes& text)
-        : begin_(text.begin), at_(text.begin), end_(text.end), name_(name) {}
+    Scanner(const fs::path& name, const FileBytes& text) : text_(text), name_(name) { prepare(); }
 
-    bool is_done() const { return at_ == end_; }
-    void next_line() { at_ = (*at_ == '\n' ? at_ : find('\n', at_, end_)) + 1; }
+    bool is_done() const { return at_ == text_.end; }
+    void next_line() {
+        at_ = (*at_ == '\n' ? at_ : find('\n', at_, text_.end)) + 1;
+        if (at_ == ready_ && !is_done()) prepare();
+    }
     bool at_end() {  // of a statement, be it the end of the line or a comment
         while (is_blank(*at_)) at_++;
         return *at_ == '\n' || *at_ == '#';
@@ -122,7 +123,7 @@ public:
     }
     std::string rest() {  // of the line, without blanks at its ends: a name may contain blanks and '#'
         at_end();
-        char *const begin = at_, *end = at_ = find('\n', at_, end_);
+        char *const begin = at_, *end = at_ = find('\n', at_, text_.end);
         while (end > begin && is_blank(end[-1])) end--;
         std::string text(begin, end);
         std::replace(text.begin(), text.end(), '\0', ' ');
@@ -131,7 +132,7 @@ public:
 
     // A finite number, or false. What is too small is zero or denormal.
     bool real(double& value) {
-        const auto [end, error] = std::from_chars(after_plus(), end_, value);
+        const auto [end, error] = std::from_chars(after_plus(), text_.end, value);
         if (error == std::errc::result_out_of_range)  // too large or too small: strtod says which
             value = std::strtod(std::string(after_plus(), end).c_str(), nullptr);
         if (error == std::errc::invalid_argument || !std::isfinite(value) || !ends_word(*end)) return false;
@@ -147,7 +148,7 @@ public:
     }
     int integer(const char* what) {  // its magnitude is below 2^31
         int value = 0;
-        const auto [end, error] = std::from_chars(after_plus(), end_, value);
+        const auto [end, error] = std::from_chars(after_plus(), text_.end, value);
         if (error != std::errc()) fail_word(what);
         at_ += end - at_;
         return value;
@@ -162,14 +163,26 @@ public:
     }
 
 protected:
-    char *begin_, *at_, *end_;
+    FileBytes text_;
+    char* at_ = text_.begin;
 
 private:
+    // Joins the lines of about a megabyte more. What lies before them is not held any longer.
+    void prepare() {
+        text_.forget_before(at_);
+        do {
+            char* const begin = ready_;
+            ready_ = find('\n', begin + std::min<std::ptrdiff_t>(1 << 20, text_.end - begin - 1), text_.end) + 1;
+            if (find('\0', begin, ready_)) refuse(name_, "binary");
+            join_lines(begin, ready_, text_.end);
+        } while (ready_[-1] != '\n');  // the last one goes on
+    }
     const char* after_plus() const { return at_ + (*at_ == '+' && at_[1] != '-'); }
     std::string line() const {
-        return std::to_string(1 + std::count_if(begin_, at_, [](char c) { return c == '\n' || c == '\0'; }));
+        return std::to_string(1 + std::count_if(text_.begin, at_, [](char c) { return c == '\n' || c == '\0'; }));
     }
 
+    char* ready_ = text_.begin;  // lines up to here are joined
     fs::path name_;
 };
 
@@ -197,9 +210,7 @@ public:
         // About what a mesh of many faces comes to: to grow costs a copy and fresh memory, a fifth of the loading time.
         const std::ptrdiff_t bytes = text.end - text.begin;
         verts.reserve(bytes / 96), uvs.reserve(bytes / 96), normals.reserve(bytes / 96), corners.reserve(bytes / 32);
-        const char* kept = text.begin;
         for (; !is_done(); next_line()) {
-            if (at_ - kept > 1 << 22) text.forget_before(kept = at_);  // else all of it is held at once
             if (skip_word("v")) vertex();
             else if (skip_word("vt")) uvs.push_back(vector<2>(1));
             else if (skip_word("vn")) normals.push_back(normalized(vector<3>(3)));

@@ -203,6 +203,15 @@ TEST("line ends, tabs, blanks, comments, continued lines, a byte order mark, wor
         obj += std::string(size - obj.size() - 8, '-') + "\nf 2 3 4";
         for (const char* end : {"", "\n", "\\"}) check_faces({{obj + end, "0 1 2, 1 2 3"}});
     }
+    // Around a megabyte's end: lines are joined so many at a time, and what lies before them is not held.
+    for (int size = (1 << 20) - 30; size <= 1 << 20; size++) {
+        const std::string obj = square + "#" + std::string(size - square.size() - 2, '-') + "\n";
+        check_faces({{obj + "f 1 \\\n2 3 # \\\nf 2 \\ \n\\\n 3 4", "0 1 2, 1 2 3"}});
+        check_errors({{obj + "f 1 \\\n2 3\nf \\\n\\\n1 2 x", "10: 'x' is no vertex index"}});
+    }
+    const std::string far(1 << 21, '#');
+    check_errors({{"v 0 0 0\r" + far + "\rv 1 0 0\r" + far + "\rf 1 1 x", "5: 'x' is no vertex index"},
+                  {square + far + "\nf 1 2 3 \\\n4\n" + far + "\nf 1 2 9 ", "9: '9' is none"}});
 }
 
 TEST("a file without a face, a missing file, a folder, a device and a binary file are errors") {
@@ -211,7 +220,8 @@ TEST("a file without a face, a missing file, a folder, a device and a binary fil
     std::string utf16;
     for (const char c : square) utf16 += {c, '\0'};
     CHECK_EQ(load(square + "f 1 2 3\n" + std::string(300, '\0')).nfaces(), 1);  // a last block, filled up
-    for (const std::string& obj : {utf16, square + "f 1 2 3\n" + std::string(1, '\0') + "\n"})
+    for (const std::string& obj : {utf16, square + "f 1 2 3\n" + std::string(1, '\0') + "\n",
+                                   square + std::string(1 << 21, '\n') + std::string(1, '\0') + "\nf 1 2 3\n"})
         check_errors({{obj, " is a binary file, not a text of vertices and faces"}});
     const std::string header(80, 'x'), face(50, '\1');
     for (const auto& [bytes, kind] : std::vector<std::pair<std::string, std::string>>{
