@@ -14,7 +14,6 @@
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 #include <vector>
 
 struct Options {  // the lesson's scene; the command line can change each of these
@@ -249,30 +248,29 @@ struct Value {
     [[noreturn]] void fail(const std::string& wanted) const {
         throw UsageError(option + ": \"" + text + "\" is not " + wanted);
     }
+    // Whether it has this form, as scanf writes it, with nothing behind.
+    bool is(const std::string& format, auto*... parts) const {
+        char rest;
+        return std::sscanf(text.c_str(), (format + "%c").c_str(), parts..., &rest) == int{sizeof...(parts)};
+    }
     void read(double& n) const {
-        char rest;  // what follows the last number, which nothing should
-        if (std::sscanf(text.c_str(), "%lf%c", &n, &rest) != 1 || !std::isfinite(n)) fail("a number");
+        if (!is("%lf", &n) || !std::isfinite(n)) fail("a number");
     }
     void read_factor(double& n) const {
         read(n);
         if (n < 1e-6 || n > 1e6) fail("1e-6 to 1e6");
     }
     void read(int& n, int most, int least = 1) const {
-        char rest;
-        if (std::sscanf(text.c_str(), "%5d%c", &n, &rest) != 1 || n < least || n > most)
-            fail(std::to_string(least) + " to " + std::to_string(most));
+        if (!is("%5d", &n) || n < least || n > most) fail(std::to_string(least) + " to " + std::to_string(most));
     }
     void read_frames(int& n, int& first, int& end) const {
-        char rest;
-        if (std::sscanf(text.c_str(), "%5d:%5d/%5d%c", &first, &end, &n, &rest) != 3) read(n, 9999), first = 0, end = n;
+        if (!is("%5d:%5d/%5d", &first, &end, &n)) read(n, 9999), first = 0, end = n;
         if (first < 0 || first >= end || end > n || n > 9999) fail("N or A:B/N, 0 <= A < B <= N <= 9999");
     }
     void read_size(int& w, int& h) const {
-        char x = 'x', rest;
-        const int read = std::sscanf(text.c_str(), "%5d%c%5d%c", &w, &x, &h, &rest);
-        if (read == 1) h = w;
-        if ((read != 1 && read != 3) || (x != 'x' && x != 'X') || std::min(w, h) < 1 || std::max(w, h) > max_size)
-            fail("N or WxH, each 1 to " + std::to_string(max_size));
+        if (is("%5d", &w)) h = w;
+        else if (!is("%5dx%5d", &w, &h) && !is("%5dX%5d", &w, &h)) w = 0;
+        if (std::min(w, h) < 1 || std::max(w, h) > max_size) fail("N or WxH, each 1 to " + std::to_string(max_size));
     }
     void read(std::filesystem::path& folder) const {
         folder = text;
@@ -284,9 +282,7 @@ struct Value {
             fail("a folder: framebuffer.tga and depth.tga are written into it");
     }
     void read(vec3& v) const {
-        char rest;
-        if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3)
-            fail("three numbers X,Y,Z joined by commas, as in 1,1,0");
+        if (!is("%lf,%lf,%lf", &v.x, &v.y, &v.z)) fail("three numbers X,Y,Z joined by commas, as in 1,1,0");
         if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
     }
     Arguments::Placed& last_model(Arguments& o) const {
@@ -294,11 +290,9 @@ struct Value {
         return o.models.back();
     }
     void read_light(Arguments& o, Options::Light kind, double half_angle) const {
-        char rest;
         vec3& v = o.light_dir;
-        const int n = std::sscanf(text.c_str(), "%lf,%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &half_angle, &rest);
-        if (kind == Options::Light::far || n == 3) Value{option, text}.read(v);
-        else if (n != 4 || !(half_angle > 0 && half_angle <= 89)) fail("X,Y,Z or X,Y,Z,DEG, DEG up to 89");
+        if (kind == Options::Light::far || !is("%lf,%lf,%lf,%lf", &v.x, &v.y, &v.z, &half_angle)) read(v);
+        else if (!(half_angle > 0 && half_angle <= 89)) fail("X,Y,Z or X,Y,Z,DEG, DEG up to 89");
         else if (!(norm(v) <= 1e307)) fail("of a length up to 1e307");
         o.light = kind, o.half_angle = half_angle, o.own_light = true;
     }
@@ -538,17 +532,14 @@ static void note_darkness(const Arguments& opt, const TGAImage& frame, bool is_s
 
 // The names of the kinds of map that no material of any model has, each after a comma.
 static std::string missing_maps(const std::vector<Model>& models) {
-    std::string names;
-    for (const auto& [name, map, or_else] : {std::tuple(",diffuse", &Material::diffuse, &Material::diffuse),
-                                             {",normal_map", &Material::normal, &Material::tangent},
-                                             {",specular", &Material::specular, &Material::specular},
-                                             {",glow", &Material::glow, &Material::glow}}) {
-        bool is_there = false;
-        for (const Model& model : models)
-            for (const Material& m : model.materials()) is_there = is_there || m.*map || m.*or_else;
-        if (!is_there) names += name;
-    }
-    return names;
+    bool diffuse = false, normal = false, specular = false, glow = false;
+    for (const Model& model : models)
+        for (const Material& m : model.materials()) {
+            diffuse = diffuse || m.diffuse, normal = normal || m.normal || m.tangent;
+            specular = specular || m.specular, glow = glow || m.glow;
+        }
+    return std::string(diffuse ? "" : ",diffuse") + (normal ? "" : ",normal_map") + (specular ? "" : ",specular") +
+           (glow ? "" : ",glow");
 }
 
 static double milliseconds() {
