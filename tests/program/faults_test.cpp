@@ -161,7 +161,10 @@ TEST("a file that cannot grow is one error line; a run that ends there leaves wh
         CHECK(stage.run(limit_file_size(limit, true)).killed_by(SIGXFSZ));  // at that very byte
         const Contents now = contents(stage.out);
         CHECK(stage.whole(now));
-        CHECK(now.at(std::string(limit < depth ? depth_tga : frame_tga) + ".part").size() <= limit);
+        std::size_t parts = 0;  // they are written side by side: one may not have been begun
+        for (const auto& [name, bytes] : now)
+            if (fs::path(name).extension() == ".part") CHECK(bytes.size() <= limit), parts++;
+        CHECK(parts > 0);
         stage.check_drawn();
     }
 }
@@ -201,9 +204,10 @@ TEST("a full disk is one error line") {
     const Stage stage(100);
     const pid_t pid = fork();  // the mount ends with this child
     if (pid == 0) {
+        const int failed_before = failed_checks();
         if (!mount_small_disk(stage.out)) _exit(2);
         check_full_disk(stage);
-        _exit(failed_checks() > 0);
+        _exit(failed_checks() > failed_before);
     }
     int status = -1;
     waitpid(pid, &status, 0);
