@@ -1,6 +1,7 @@
-// tgaimage.cpp: reading and writing Truevision TGA files. It knows no other format, and not what a picture is for.
+// tgaimage.cpp: files as a whole; reading and writing Truevision TGA files; a picture in the terminal. It decodes no
+// other format, and does not know what a picture is for.
 //
-// A file is: a header of 18 bytes, an image ID, a colour map, the pixels row by row, and since version 2.0 a footer.
+// A TGA file is a header of 18 bytes, an image ID, a colour map, the pixels row by row, and since version 2.0 a footer.
 // Everything that a header claims is held against the bytes that the file has before memory is asked for.
 #include "tgaimage.h"
 
@@ -65,15 +66,18 @@ std::string reason() { return errno ? std::generic_category().message(errno) : "
 FileBytes read_file(const fs::path& path, std::size_t beyond) {
     constexpr std::uintmax_t most = std::uintmax_t{1} << 32;
     const auto fail = [&](const std::string& what) { throw std::runtime_error(path.string() + ": " + what); };
+    const bool is_input = path == "-";  // standard input, whatever file has that name
     std::error_code unknown;
-    if (fs::is_directory(path, unknown)) fail("is a directory");
-    const Stream file = path == "-" ? Stream(stdin, [](std::FILE*) { return 0; }) : open(path, "rb");
+    if (!is_input && fs::is_directory(path, unknown)) fail("is a directory");
+    const Stream file = is_input ? Stream(stdin, [](std::FILE*) { return 0; }) : open(path, "rb");
     if (!file) fail("cannot be opened: " + reason());
 #ifdef MAP_PRIVATE
     // A mapping costs neither a copy nor fresh memory: a quarter of the loading time. What lies beyond the file on its
     // last page can be used too.
-    const std::uintmax_t size = fs::file_size(path, unknown), page = sysconf(_SC_PAGESIZE), rest = size % page;
-    if (!unknown && size < most && rest > 0 && rest + beyond <= page) {
+    const std::uintmax_t size = is_input ? 0 : fs::file_size(path, unknown);
+    const std::uintmax_t page = sysconf(_SC_PAGESIZE), rest = size % page;
+    if (!unknown && size >= most) fail("is larger than 4 GiB");
+    if (!unknown && rest > 0 && rest + beyond <= page) {
         void* const map = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE, fileno(file.get()), 0);
         char* const first = static_cast<char*>(map);
         if (map != MAP_FAILED) return {{map, [size](void* p) { munmap(p, size); }}, first, first + size, true};
@@ -91,8 +95,7 @@ FileBytes read_file(const fs::path& path, std::size_t beyond) {
 std::string other_picture_kind(const fs::path& path) {
     static constexpr std::pair<std::string_view, const char*> kinds[] = {
         {"\x89PNG", "png:"}, {"\xFF\xD8\xFF", "jpeg:"}, {"GIF8", "gif:"}, {"BM", "bmp:"}, {"RIFF", "webp:"},
-        {"DDS ", "dds:"},
-        {"II*", "tiff:"}, {"MM", "tiff:"}, {"8BPS", "psd:"}, {"v/1\1", "exr:"}, {"#?RA", "hdr:"}};
+        {"DDS ", "dds:"}, {"II*", "tiff:"}, {"MM", "tiff:"}, {"8BPS", "psd:"}, {"v/1\1", "exr:"}, {"#?RA", "hdr:"}};
     char bytes[4] = {};
     std::ifstream(path, std::ios::binary).read(bytes, sizeof bytes);
     for (const auto& [first, kind] : kinds)
@@ -449,8 +452,8 @@ void Terminal::progress([[maybe_unused]] int done, [[maybe_unused]] int all) {
 #endif
 }
 
-int Terminal::columns() const { return std::max(1, terminal_size().first); }
-int Terminal::rows() const { return std::max(2, terminal_size().second); }
+int Terminal::columns() const { return std::clamp(terminal_size().first, 1, 4000); }  // a picture has a largest size
+int Terminal::rows() const { return std::clamp(terminal_size().second, 2, 4000); }
 
 void Terminal::show(const TGAImage& picture, std::string line) const {
     line.resize(std::min<std::size_t>(line.size(), columns()));
@@ -458,7 +461,7 @@ void Terminal::show(const TGAImage& picture, std::string line) const {
     std::fflush(stdout);
 }
 
-TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(path) {
+TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : TGAFile(path) {
     if (image.empty()) throw std::invalid_argument(path.string() + ": a picture of 0 x 0 pixels cannot be written");
     const int w = image.width(), h = image.height(), bpp = image.bytespp();
     const int type = (bpp == TGAImage::GRAYSCALE ? 3 : 2) | (rle ? rle_bit : 0);
@@ -476,7 +479,7 @@ TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(
     temporary += ".part";
     Stream stream = open(temporary, "wb");
     if (!stream) fail(path_, reason());
-    temporary_.path = temporary;
+    temporary_ = temporary;
     errno = 0;
     // A run saves at least the header of the raw packet before it, so that a row takes at most its own bytes and a
     // header for each 128 pixels. Some rows at a time: fresh memory for all would take longer than to encode them.
@@ -500,12 +503,12 @@ TGAFile::TGAFile(const TGAImage& image, const fs::path& path, bool rle) : path_(
 
 void TGAFile::commit() {
     std::error_code error;
-    fs::rename(temporary_.path, path_, error);
+    fs::rename(temporary_, path_, error);
     if (error) fail(path_, error.message());
-    temporary_.path.clear();
+    temporary_.clear();
 }
 
-TGAFile::Temporary::~Temporary() {
+TGAFile::~TGAFile() {
     std::error_code ignored;
-    if (!path.empty()) fs::remove(path, ignored);
+    if (!temporary_.empty()) fs::remove(temporary_, ignored);
 }

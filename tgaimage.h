@@ -116,15 +116,11 @@ public:
 class TGAFile {
 public:
     TGAFile(const TGAImage& image, const std::filesystem::path& path, bool rle = true);
+    TGAFile(const TGAFile&) = delete;
+    ~TGAFile();
     void commit();
 
 private:
-    struct Temporary {
-        std::filesystem::path path;  // empty: there is none
-        Temporary() = default;
-        Temporary(Temporary&& other) : path(std::exchange(other.path, {})) {}
-        ~Temporary();
-    };
-    std::filesystem::path path_;
-    Temporary temporary_;
+    explicit TGAFile(const std::filesystem::path& path) : path_(path) {}  // what throws after it is destroyed, too
+    std::filesystem::path path_, temporary_;  // the second is empty where there is none
 };

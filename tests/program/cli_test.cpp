@@ -178,6 +178,8 @@ TEST("--at, --turn and --scale place the model before them; a file is read once,
     CHECK(f.run(view + "--up 0,-2,0 box.obj --turn 90").same_pictures(f.run(view + "--up 0,-1,0 box.obj --turn -270")));
     const Outcome twice = f.run(view + "- -" + place + " <box.obj");  // standard input can be read only once
     CHECK(twice.status == 0 && twice.same_pictures(f.run(view + "box.obj placed.obj")));
+    f.write("-", std::string(99999, ' '));  // a file of that name is another
+    CHECK(f.run(view + "- <box.obj").same_pictures(f.run(view + "box.obj")));
     f.write("note.obj", prism([](const vec3& v) { return v; }) + "f 1 2\n");
     CHECK_EQ(lines(f.run("--no-fit --light 1,1,1 --size 9 note.obj note.obj --at 1,0,0").err), 1);
     for (const std::string wrong : {"--at 1,2,3 box.obj", "box.obj --turn x", "box.obj --scale 0", "box.obj --at 1"})
