@@ -28,8 +28,7 @@ int count(const auto& array) { return static_cast<int>(array.size()); }
 // Text from elsewhere, made fit for a message: at most 60 characters, none of them a control character.
 std::string in_quotes(std::string_view text, std::size_t most = 60) {
     std::string out(text.substr(0, most));
-    for (char& c : out)
-        if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
+    std::replace_if(out.begin(), out.end(), [](unsigned char c) { return c < ' ' || c == 127; }, '?');
     return "'" + out + (text.size() > most ? "...'" : "'");
 }
 
@@ -491,7 +490,7 @@ void make_normals(Obj& obj) {
         }
         for (int j = 0; j < n; j++) {
             int& normal = obj.corners[own[j]].normal;
-            if (normal >= 0 && !(obj.normals[normal] == vec3{})) continue;
+            if (normal >= 0 && obj.normals[normal] != vec3{}) continue;
             // A sum of n terms is off by at most n half-units of the sum of their sizes, its terms themselves by less
             // than 4 units each. No more than that is left where the faces cancel, as on the two sides of a sheet: then
             // a face has its own normal, or an upright one where it has no area.
@@ -568,7 +567,9 @@ fs::path found(const fs::path& from, std::string name) {
     const std::string last = lower(fs::path(name).filename().string());
     for (const fs::path& place : places)
         for (const fs::path& entry : fs::directory_iterator(place.empty() ? "." : place, ignored))
-            if (lower(entry.filename().string()) == last && (best.empty() || entry < best)) best = entry;
+            if (lower(entry.filename().string()) == last && (best.empty() || entry < best) &&
+                !fs::is_directory(entry, ignored))
+                best = entry;
     return best.lexically_normal();
 }
 
@@ -679,10 +680,11 @@ void plan_textures(const fs::path& path, const Model::Group& group, Obj& obj, co
     for (const auto& [what, note] : mtl.notes) add(notes, what, note.first, note.count);
     MtlMap maps[map_count];
     std::error_code ignored;
+    const fs::path places[] = {path, fs::weakly_canonical(path, ignored)};
     for (int i = 0; i < map_count; i++) {
         const bool is_bump = i == tangent_map && mtl.maps[i].path.empty();
         maps[i] = mtl.maps[is_bump ? bump_map : i];
-        for (fs::path file : {path, fs::weakly_canonical(path)})
+        for (fs::path file : places)
             if (maps[i].path.empty() && fs::exists(file.replace_extension() += map_suffixes[i], ignored)) {
                 maps[i].path = picture(file, file, file.filename().string(), notes);
                 break;

@@ -783,7 +783,9 @@ TEST("a map is found by its last part in any case, beside a link's target, as .t
         }
     CHECK_EQ(drawn("gone.tga"), "-1 -1 -1 -1 -1; a picture that is not there, left out: 'gone.tga'\n");
     CHECK_EQ(drawn(""), "-1 -1 -1 -1 -1; ");
-    CHECK_EQ(drawn("."), "-1 -1 -1 -1 -1; a picture that is not there, left out: '.'\n");
+    for (const std::string folder_name : {".", "Maps"})
+        CHECK_EQ(drawn(folder_name),
+                 "-1 -1 -1 -1 -1; a picture that is not there, left out: '" + folder_name + "'\n");
     CHECK_EQ(drawn("-s 1 \"maps/Wood.tga\""), "10 -1 -1 -1 -1; ");
     folder.write("t.png", "\x89PNG");
     folder.picture("t.tga", 40);
