@@ -34,7 +34,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
 // ---- pass 1: what the light sees ----
 
 // A light is a camera. One that is infinitely far off has no perspective; what another reaches comes to [-1,1]^2. The
-// direction serves as a place, since center is the origin by now: frame() has moved the scene.
+// direction serves as a place, since center is the origin by now: arrange() has moved the scene.
 static Camera light_camera(const Options& opt) {
     return {lookat(opt.light_dir, opt.center, opt.up),
             opt.light == Options::Light::far ? projection(0) : beam(norm(opt.light_dir), opt.half_angle)};
@@ -187,7 +187,7 @@ static Camera viewer(const Options& opt) {
 // but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
 static void first_pass(const Options& opt, const Models& casters, Shadow& shadow) {
     shadow.method = casters.empty() ? Options::Method::off : opt.method;
-    if (casters.empty()) return;
+    if (shadow.method == Options::Method::off) return;
     const bool exact = opt.method == Options::Method::exact;
     const bool classic = opt.bias && opt.light == Options::Light::far;
     const int size = exact ? LightGrid::good_cells(casters) : opt.shadow_size;
@@ -391,21 +391,20 @@ static Arguments parse(int argc, char** argv) {
         if (!*option->takes && joined) throw UsageError(value.option + " takes no value");
         if (*option->takes && !joined) {
             // What looks like the next option is no value: -o --quiet is not to make a folder of that name.
-            if (++i == argc || std::string(argv[i]).rfind("--", 0) == 0)
+            if (++i == argc || std::string(argv[i]).starts_with("--"))
                 throw UsageError(value.option + ": a value is missing");
             value.text = argv[i];
         }
         option->set(opt, value);
     }
+    const bool has_map = opt.method == Options::Method::map, is_far = opt.light == Options::Light::far;
     if (!std::isfinite(1 / norm(opt.eye - opt.center))) throw UsageError("--eye and --center are the same point");
-    if (opt.bias && opt.method != Options::Method::map) throw UsageError("--bias belongs to --shadow map");
-    if (opt.caster_faces == Faces::back && opt.method != Options::Method::map)
-        throw UsageError("--casters back belongs to --shadow map");
-    const bool is_far = opt.light == Options::Light::far;
+    if (opt.bias && !has_map) throw UsageError("--bias belongs to --shadow map");
+    if (opt.caster_faces == Faces::back && !has_map) throw UsageError("--casters back belongs to --shadow map");
     if (is_far && opt.light_dir == vec3{}) throw UsageError("--light has no direction");
     if (!is_far && !std::isfinite(1 / norm(opt.light_dir - opt.center)))
         throw UsageError("the light and --center are at the same point");
-    if (opt.only == Arguments::Only::depth && opt.method != Options::Method::map)
+    if (opt.only == Arguments::Only::depth && !has_map)
         throw UsageError("--only depth: there is no shadow buffer without --shadow map");
     if (opt.models.empty()) opt.models.push_back({UMBRA_OBJ_DIR "/idol/idol.obj", {}});
     return opt;
@@ -433,12 +432,11 @@ static void note(const Arguments& opt, const std::string& what) {
 }
 
 struct Scene {
-    std::vector<Model> models, skies;  // at most one sky
-    Models sky;                        // if it is to be seen
-    Models seen;                       // by the viewer: only these are shaded, and have textures
-    Models casters;                    // may throw a shadow onto what is seen
-    Model object;                      // the first model at rest, if it goes round ...
-    vec3 axis;                         // ... this, where its own origin is
+    std::vector<Model> models, sky;  // at most one sky, if it is to be seen
+    Models seen;                     // by the viewer: only these are shaded, and have textures
+    Models casters;                  // may throw a shadow onto what is seen
+    Model object;                    // the first model at rest, if it goes round ...
+    vec3 axis;                       // ... this, where its own origin is
 };
 
 static Scene load(const Arguments& opt) {
@@ -450,16 +448,15 @@ static Scene load(const Arguments& opt) {
         else scene.models.emplace_back(placed.path, opt.tangent ? NormalMap::tangent : NormalMap::object);
     }
     if (!opt.sky.empty() && opt.draw == Options::Draw::color && opt.only != Arguments::Only::depth) {
-        scene.skies.emplace_back(opt.sky).load_textures();
-        scene.sky = scene.skies;
-        for (const std::string& what : scene.skies[0].notes()) note(opt, opt.sky.string() + ": " + what);
+        scene.sky.emplace_back(opt.sky).load_textures();
+        for (const std::string& what : scene.sky[0].notes()) note(opt, opt.sky.string() + ": " + what);
     }
     for (std::size_t i = 0; i < scene.models.size(); i++) {
         const Arguments::Placed& placed = opt.models[i];
         Model& model = scene.models[i];
         model.turn = rotation(opt.up, placed.turn);
         const mat4 M_o = translation(placed.at) * model.turn;
-        if (!(M_o == mat4::identity()) || placed.scale != 1)
+        if (M_o != mat4::identity() || placed.scale != 1)
             model.move([&](const vec3& v) { return (M_o * point(v * placed.scale)).xyz(); });
     }
     return scene;
@@ -553,12 +550,12 @@ static double median(std::vector<double>& values) {
 
 // Brings the scene to where it is drawn: fitted to the picture, and then with center, which matrices would have to undo
 // at the cost of digits if it were far off, at the origin.
-static void frame(Arguments& opt, Scene& scene) {
+static void arrange(Arguments& opt, Scene& scene) {
     const Model& first = scene.models[0];
     const vec3 low = first.low(), side = first.high() - low;
     // As the default eye sees it, so that a scene does not change its size when the eye moves; but whoever says what is
     // up has another view in mind.
-    const bool has_up = !(opt.up == Options().up);
+    const bool has_up = opt.up != Options().up;
     if (opt.fit && fit(scene.models, has_up ? opt.eye - opt.center : Options().eye, opt.up)) {
         if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the lesson's leaves dark what faces the viewer
         note(opt, opt.own_light ? "the scene is fitted to the picture (--no-fit)"
@@ -590,9 +587,10 @@ static bool obey(char key, Arguments& o) {
         v = (rotation(axis, degrees) * direction(v)).xyz();
     };
     const auto lift = [&](double degrees, vec3& v) {  // not over the top, where left and right change places
+        const auto off_top = [&](const vec3& at) { return norm(cross(normalized(at), normalized(o.up))); };
         vec3 lifted = v;
-        about(cross(v, o.up), degrees, lifted);
-        if (norm(cross(normalized(lifted), normalized(o.up))) > .1) v = lifted;
+        about(lookat(v, o.center, o.up)[0].xyz(), -degrees, lifted);  // where v is along up, too
+        if (off_top(lifted) >= std::min(.1, off_top(v))) v = lifted;
     };
     constexpr double biases[] = {0, 10, 43.34, 100};
     switch (key) {
@@ -611,9 +609,10 @@ static bool obey(char key, Arguments& o) {
             return true;
         case 'm': return o.method = Options::Method((int(o.method) + 1) % 3), o.bias.reset(), true;
         case 'b': {
+            if (o.method != Options::Method::map) return false;
             const double* const next = std::upper_bound(std::begin(biases), std::end(biases), o.bias.value_or(-1));
             o.bias = next == std::end(biases) ? std::nullopt : std::optional(*next);
-            return o.method == Options::Method::map;
+            return true;
         }
         default: return false;
     }
@@ -629,14 +628,11 @@ static void view(Arguments at_rest, Scene& scene) {
     bool turns = false;
     int i = 0;
     double began = 0;
-    const auto rest = [&] {  // 50 pictures a second
-        return std::max(0, static_cast<int>(20 + began - milliseconds()));
-    };
-    for (char key = 0; key != 'q'; key = terminal.key(turns ? rest() : -1)) {
+    for (char key = 0; key != 'q';  // 0: the window has changed; when it turns, 50 pictures a second
+         key = terminal.key(turns ? std::max(0, static_cast<int>(20 + began - milliseconds())) : -1)) {
         if (key == ' ') turns = !turns;
-        const bool is_new = obey(key, at_rest), resized = key == 0;
         if (turns) i = (i + 1) % at_rest.frames;
-        if (!turns && !is_new && !resized && key != 'p') continue;
+        if (!obey(key, at_rest) && !turns && key != 0 && key != 'p') continue;
         began = milliseconds();
         Arguments opt = at_rest;
         turn(at_rest, i, opt, scene);
@@ -661,7 +657,7 @@ static void run(Arguments opt) {
     const double start = milliseconds();
     prepare_folder(opt);
     Scene scene = load(opt);
-    frame(opt, scene);
+    arrange(opt, scene);
     leave_out(opt, scene);
     load_textures(opt, scene);
     if (opt.view) return view(opt, scene);

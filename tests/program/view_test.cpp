@@ -141,6 +141,23 @@ TEST("--view: every key changes the picture, and nothing else draws it again") {
     CHECK_EQ(TGAImage::read_tga_file(f / "depth.tga").width(), 100);
 }
 
+TEST("--view: b means nothing to exact shadows; w moves a light that stands above") {
+    const Folder f;
+    f.write("m.obj", "v -4 -1 4\nv 4 -1 4\nv 4 -1 -4\nv -4 -1 -4\nf 1 2 3 4\n"  // a floor, and a roof beside what the
+                     "v 2 0 1\nv 3 0 1\nv 3 0 0\nf 5 6 7\n");                    // unfitted light sees
+    f.run("--no-fit --size 50x30 --zoom .3 --light 1,2,0 --shadow exact -o exact m.obj");
+    PseudoTerminal t({"--view", "--no-fit", "--size", "50x30", "--zoom", ".3", "--light", "1,2,0", "-o",
+                      f.path().string(), (f / "m.obj").string()});
+    t.type("mbpq");
+    std::string rest;
+    CHECK_EQ(t.end(rest), 0);
+    CHECK(!f.read("exact/framebuffer.tga").empty() && f.read("framebuffer.tga") == f.read("exact/framebuffer.tga"));
+    PseudoTerminal above({"--view", "--light", "0,1,0", "--shadow-size", "100", "-o", f.path().string()});
+    const std::string first = blocks(above.picture());
+    above.type("w");
+    CHECK(blocks(above.picture()) != first);
+}
+
 TEST("--view: signals leave the terminal as it was") {
     const Folder f;
     for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
