@@ -6,7 +6,6 @@
 #pragma once
 #include <cassert>
 #include <cmath>
-#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -329,18 +328,11 @@ INLINED vec<n, real> to_real(const vec<n, coord>& v) {
 // functions, because the wrong one compiles just as well and leaks the projection into every normal.
 template <int n, typename T>
 INLINED constexpr vec<n + 1, T> point(const vec<n, T>& v) {
-    vec<n + 1, T> h;
-    for (int i = 0; i < n; i++) h[i] = v[i];
-    h[n] = 1;
-    return h;
+    return componentwise<n + 1, T>([&](int i) { return i < n ? v[i] : T(1); });
 }
-
 template <int n, typename T>
 INLINED constexpr vec<n + 1, T> direction(const vec<n, T>& v) {
-    vec<n + 1, T> h;
-    for (int i = 0; i < n; i++) h[i] = v[i];
-    h[n] = 0;
-    return h;
+    return componentwise<n + 1, T>([&](int i) { return i < n ? v[i] : T(0); });
 }
 
 // From homogeneous back to Cartesian coordinates: the perspective division. The caller sees to it that w is not zero.

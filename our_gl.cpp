@@ -194,14 +194,16 @@ Models casters(const Models& models, const Models& receivers, const Camera& ligh
             }
         return std::pair(low, high);
     };
+    std::vector<std::pair<vec3, vec3>> lit;
+    for (const Model* receiver : receivers) lit.push_back(box(receiver));
     Models result;
     for (const Model* model : models) {
         const auto [low, high] = box(model);
-        const auto may_shadow = [&, l = low, h = high](const Model* receiver) {
-            const auto [from, to] = box(receiver);
+        const auto may_shadow = [l = low, h = high](const auto& receiver) {
+            const auto& [from, to] = receiver;
             return !(l.x > to.x || h.x < from.x || l.y > to.y || h.y < from.y || h.z < from.z);
         };
-        if (std::any_of(receivers.begin(), receivers.end(), may_shadow)) result.push_back(model);
+        if (std::any_of(lit.begin(), lit.end(), may_shadow)) result.push_back(model);
     }
     return result;
 }
@@ -332,15 +334,12 @@ private:
     std::vector<std::jthread> others_;  // last: they end before what they use
 };
 
-int& wanted_threads() {
-    static int n = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-    return n;
-}
+int wanted_threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 
 }  // namespace
 
-void use_threads(int n) { wanted_threads() = n; }
-int thread_count() { return wanted_threads(); }
+void use_threads(int n) { wanted_threads = n; }
+int thread_count() { return wanted_threads; }
 
 void parallel_for(int n, const std::function<void(int, int)>& work) {
     static std::optional<Pool> pool;
@@ -356,10 +355,6 @@ namespace {
 // others; none is worth fewer than 64.
 int parts(const std::vector<int>& first) { return std::clamp(first.back() / 64, 1, 8 * thread_count()); }
 
-int model_of(int i, const std::vector<int>& first) {
-    return static_cast<int>(std::upper_bound(first.begin(), first.end(), i) - first.begin()) - 1;
-}
-
 // Calls work(part, m, begin, end, thread) for [begin,end) of model m, which belongs to a part.
 template <class Work>
 void in_parts(const std::vector<int>& first, Work&& work) {
@@ -367,7 +362,8 @@ void in_parts(const std::vector<int>& first, Work&& work) {
     const auto begin_of = [&](int part) { return static_cast<int>(std::int64_t{first.back()} * part / n); };
     parallel_for(n, [&](int part, int thread) {
         int begin = begin_of(part), end = begin_of(part + 1);
-        for (int m = model_of(begin, first); begin < end; begin = first[++m])
+        auto m = static_cast<int>(std::upper_bound(first.begin(), first.end(), begin) - first.begin()) - 1;
+        for (; begin < end; begin = first[++m])
             work(part, m, begin - first[m], std::min(end, first[m + 1]) - first[m], thread);
     });
 }
@@ -389,12 +385,11 @@ constexpr double guard = 4096;
 // scale, size their largest magnitude.
 struct Screen {
     vec4 corner[3];
-    double size, near;
+    double size = 0, near = w_near;
 };
 
 // Measures the corners. False for a coordinate beyond the range of a double, which has no place on the screen.
 bool measure(Screen& s) {
-    s.size = 0, s.near = w_near;
     for (const vec4& p : s.corner) {
         for (int k = 0; k < 4; k++) {
             if (!std::isfinite(p[k])) return false;
@@ -826,21 +821,21 @@ struct Pass {
         float* depth = zbuffer ? zbuffer->row(y_begin) : (w.depth.resize(cells), w.depth.data());
         std::fill_n(depth, cells, DepthBuffer::nothing);
         if (picture) w.nearest.assign(cells, -1), w.faces.clear();
-        pack<std::int32_t> covered = 0;
-        for (const Block& b : blocks)
+        for (const Block& b : blocks) {
+            pack<std::int32_t> covered = 0;
             for (const Face& each : b.touching[strip]) {
                 FaceInBox face{each, {}};
                 const IShader& own = shader(face.shader, thread);
                 Point corners[most_corners];
                 const int n = corners_of(face, own, corners, face.is_cut);
                 bound(corners, n, width, height, face);
-                for (int k = 2; k < n; k++) {  // what has been cut is a fan of triangles
-                    const Point* const abc[] = {&corners[0], &corners[k - 1], &corners[k]};
-                    covered = covered + triangle(face, own, abc, y_begin, y_end, depth, w);
-                }
+                for (int k = 2; k < n; k++)  // what has been cut is a fan of triangles
+                    covered = covered + triangle(face, own, corners[0], corners[k - 1], corners[k], y_begin, y_end,
+                                                 depth, w);
                 if (picture) w.faces.push_back(face);
             }
-        for (int i = 0; i < lanes; i++) w.count.covered += covered[i];
+            for (int i = 0; i < lanes; i++) w.count.covered += covered[i];
+        }
         if (!picture) return;
         std::memset(picture->pixel(0, y_begin), 0, std::size_t{1} * picture->bytespp() * width * (y_end - y_begin));
         for (int mark = 0; mark < static_cast<int>(w.faces.size()); mark++)
@@ -848,10 +843,9 @@ struct Pass {
     }
 
     // Draws a triangle of a face into the rows of a strip. Returns the number of samples in each lane.
-    pack<std::int32_t> triangle(const FaceInBox& face, const IShader& own, const Point* const (&abc)[3], int y_begin,
-                                int y_end, float* depth, Workspace& w) const {
+    pack<std::int32_t> triangle(const FaceInBox& face, const IShader& own, const Point& a, const Point& b,
+                                const Point& c, int y_begin, int y_end, float* depth, Workspace& w) const {
         using wide = std::int64_t;
-        const Point &a = *abc[0], &b = *abc[1], &c = *abc[2];
         constexpr wide one = wide{1} << subpixel_bits, half = one / 2;
         const wide area = (wide{b.x} - a.x) * (wide{c.y} - a.y) - (wide{b.y} - a.y) * (wide{c.x} - a.x);
         if (area == 0 || (area > 0 && drawn == Faces::back)) return 0;
@@ -859,7 +853,7 @@ struct Pass {
         const DepthPlane plane =
             face.is_cut ? planes_of(face, own) : depth_plane(a, b, c, static_cast<double>(area), face);
         const Point* const corner[] = {&a, area < 0 ? &c : &b, area < 0 ? &b : &c, &a};  // counterclockwise
-        const int y_first = std::max(y_begin, face.ymin), y_last = std::min(y_end, face.ymax + 1) - 1;
+        const int y_first = std::max(y_begin, face.ymin), y_stop = std::min(y_end, face.ymax + 1);
         const wide first_x = face.xmin / lanes * lanes * one + half, first_y = y_first * one + half;
         Edge edges[3];
         for (int i = 0; i < 3; i++) {
@@ -882,8 +876,8 @@ struct Pass {
             if (nearest) select(nearer, mark, pack<std::int32_t>::load(nearest + at)).store(nearest + at);
         };
         if (face.is_small && face.xmax - face.xmin < 4 * lanes)
-            return for_each_in_box(face, edges, y_first, y_last + 1, visit);
-        return for_each_in_spans(face, edges, y_first, y_last + 1, visit);
+            return for_each_in_box(face, edges, y_first, y_stop, visit);
+        return for_each_in_spans(face, edges, y_first, y_stop, visit);
     }
 
     // Colours those pixels of a strip that have the mark of a face, as many at once as there are lanes. Returns their
@@ -898,7 +892,8 @@ struct Pass {
         long shaded = 0;
         Barycentric b;
         const auto color = [&] {
-            if (shaded == 0) b = start(face, own);
+            for (int i = 0; i < 3 && shaded == 0; i++) own.varying(face.iface, i);  // it is seen
+            if (shaded == 0) b = planes_of(face, own);
             shaded += n;
             for (int i = n; i % lanes; i++) xs[i] = xs[n - 1], ys[i] = ys[n - 1];  // the last one fills the lanes
             for (int i = 0; i < n; i += lanes) color_lanes(face, b, own, xs + i, ys + i, std::min(n - i, lanes));
@@ -914,12 +909,6 @@ struct Pass {
         }
         if (n > 0) color();
         return shaded;
-    }
-
-    // Makes the shader write the varyings of a face.
-    Barycentric start(const FaceInBox& face, IShader& own) const {
-        for (int i = 0; i < 3; i++) own.varying(face.iface, i);
-        return planes_of(face, own);
     }
 
     void color_lanes(const FaceInBox& face, const Barycentric& b, const IShader& own, const std::int32_t* xs,
@@ -1008,11 +997,6 @@ int LightGrid::good_cells(const Models& models) {
     return std::clamp(static_cast<int>(std::sqrt(faces / 8.)), 1, 2048);
 }
 
-// Twice the area of a triangle on the light's screen, positive where it is counterclockwise there.
-static double area2(const vec3& a, const vec3& b, const vec3& c) {
-    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
-
 void LightGrid::build(const Models& models, const Camera& light, int cells) {
     cells_ = cells, side_ = cells, scale_ = 1, models_ = models;
     const mat4 to_screen = light.to_screen();
@@ -1081,7 +1065,7 @@ void LightGrid::sort_into_bands(int face, std::vector<std::vector<Touch>>& touch
     } else {
         for (int k = 0; k < 3; k++) p[k] = on_screen(faces_[face][k]);
     }
-    const double side = area2(p[0], p[1], p[2]);
+    const double side = cross(p[1] - p[0], p[2] - p[0]).z;  // positive where it is counterclockwise
     if (!is_cut && !(std::fabs(side) > 0)) return;
     vec3 low = p[0], high = p[0];
     for (int k = 1; k < n; k++)

@@ -100,10 +100,7 @@ public:
     float* row(int y) { return cells_.get() + std::ptrdiff_t{stride_} * y; }
     const float* row(int y) const { return cells_.get() + std::ptrdiff_t{stride_} * y; }
 
-    // Of the pixel that the point (x,y) lies in; outside of the buffer there is nothing.
-    double at(double x, double y) const {
-        return x >= 0 && y >= 0 && x < w_ && y < h_ ? row(static_cast<int>(y))[static_cast<int>(x)] : nothing;
-    }
+    // Of the pixel that the point lies in; outside of the buffer there is nothing.
     INLINED coord at(const vec<3, coord>& p) const {
         const mask inside = (!(p.x < 0)) & (!(p.y < 0)) & (p.x < w_) & (p.y < h_);
         const pack<std::int32_t> y = to_int(select(inside, p.y, 0)), x = to_int(select(inside, p.x, 0));

@@ -73,8 +73,8 @@ int main(int argc, char** argv) try {
     const vec3 sb_p = project(sb_h);
     vec4 corners[3];
     for (int i = 0; i < 3; i++) corners[i] = M * point(models[0].vert(found.face, i));
-    const double stored = shadowbuffer.at(sb_p.x, sb_p.y);
     const vec<3, coord> in_lanes{sb_p.x, sb_p.y, sb_p.z};
+    const double stored = shadowbuffer.at(in_lanes)[0];
     const double bias = derived_bias(shadowbuffer, in_lanes, stored, depth_slope(corners))[0];
 
     print("M", M);

@@ -232,7 +232,8 @@ TEST("what is not drawn is at minus infinity, every cell of it, and outside of t
     for (int y = 0; y < 5; y++)
         for (int x = 0; x < 7; x++) CHECK(z.row(y)[x] == -INFINITY);
     z.row(0)[0] = 1;
-    CHECK(z.at(0, .9) == 1 && z.at(-.1, 0) == -INFINITY && z.at(7, 0) == -INFINITY && z.at(NAN, 0) == -INFINITY);
+    const auto at = [&](double x, double y) { return z.at(vec<3, coord>{x, y, 0})[0]; };
+    CHECK(at(0, .9) == 1 && at(-.1, 0) == -INFINITY && at(7, 0) == -INFINITY && at(NAN, 0) == -INFINITY);
     CHECK_THROWS(DepthBuffer(0, 5), "16384");
     CHECK_THROWS(DepthBuffer(5, 16385), "16384");
 }
