@@ -27,7 +27,7 @@ struct Options {  // the lesson's scene; the command line can change each of the
     double zoom = 1;  // about the middle of the picture
     enum class Method { map, exact, off } method = Method::map;  // of shadows
     Faces caster_faces = Faces::all;  // those drawn into the shadow buffer
-    std::optional<double> bias;  // the lesson's constant, in units of depth, of 2000; without it the bias is derived
+    std::optional<double> bias;  // the classic lesson's, in units of depth, of 2000; without it the bias is derived
     enum class Draw { color, shadow, normal } draw = Draw::color;
 };
 
@@ -61,7 +61,7 @@ struct Shadow {  // what the first pass leaves for the second
 
 // ---- pass 2: what the viewer sees ----
 
-// Phong's reflection model with the lesson's weights, in eye coordinates. What a material has no map for is not
+// Phong's reflection model with the classic lesson's weights, in eye coordinates. What a material has no map for is not
 // computed. fragment() is called for a few neighbouring pixels of a face at once: a coord says where each of them is, a
 // real how bright, a mask yes or no; select() is the ?: of a mask.
 struct PhongShader final : IShader {
@@ -150,7 +150,7 @@ struct PhongShader final : IShader {
         const mask is_behind = !(sb_h.w > 0);      // a point light: what its buffer does not see is lit
         if (exact) return is_behind | !shadow.grid.shadows(sb_p, grid_face + f.face);
         const coord stored = shadow.shadowbuffer.at(sb_p);
-        // With --bias 0 surfaces shadow themselves here and there: z-fighting. The text's cure is --bias 43.34.
+        // With --bias 0 surfaces shadow themselves here and there: z-fighting. The classic cure is --bias 43.34.
         const coord bias = opt.bias ? *opt.bias : derived_bias(shadow.shadowbuffer, sb_p, stored, sb_slope);
         return is_behind | !(stored > sb_p.z + bias);  // so written because nothing but a number shadows
     }
@@ -184,7 +184,7 @@ static Camera viewer(const Options& opt) {
 }
 
 // Rendering the shadow buffer: the camera stands at the light. It is fitted to the casters, so that no texel is wasted;
-// but with a constant bias it is the text's own, which samples a texel at its corner instead of its centre.
+// but with a constant bias it is the classic one, which samples a texel at its corner instead of its centre.
 static void first_pass(const Options& opt, const Models& casters, Shadow& shadow) {
     shadow.method = casters.empty() ? Options::Method::off : opt.method;
     if (shadow.method == Options::Method::off) return;
@@ -344,7 +344,7 @@ static const Option options[] = {
      [](Arguments& o, const Value& v) { o.square_beam = v.one_of({"round", "square"}) == 1; }},
     {"--shadow", "HOW", "map: a shadow buffer, drawn as depth.tga; exact: the faces themselves; off (map)",
      [](Arguments& o, const Value& v) { o.method = Options::Method(v.one_of({"map", "exact", "off"})); }},
-    {"--bias", "N", "with map: the lesson's buffer, its camera, a constant bias of N of 2000 (there 43.34)",
+    {"--bias", "N", "with map: the classic lesson's buffer and camera, a constant bias of N of 2000 (there 43.34)",
      [](Arguments& o, const Value& v) { v.read(o.bias.emplace()); }},
     {"--casters", "FACES", "of closed bodies the back ones are enough in the shadow buffer: all or back (all)",
      [](Arguments& o, const Value& v) { o.caster_faces = Faces(v.one_of({"all", "back"})); }},
@@ -557,7 +557,7 @@ static void arrange(Arguments& opt, Scene& scene) {
     // up has another view in mind.
     const bool has_up = opt.up != Options().up;
     if (opt.fit && fit(scene.models, has_up ? opt.eye - opt.center : Options().eye, opt.up)) {
-        if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the lesson's leaves dark what faces the viewer
+        if (!opt.own_light) opt.light_dir = {1, 1, 1};  // the default one leaves dark what faces the viewer
         note(opt, opt.own_light ? "the scene is fitted to the picture (--no-fit)"
                                 : "the scene is fitted to the picture and lit from 1,1,1 (--no-fit, --light X,Y,Z)");
     }

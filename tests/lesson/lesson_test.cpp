@@ -68,6 +68,7 @@ std::vector<Figures> sentences() {
         {"On the idol `--bias 0` makes {.1} % of what faces the light falsely dark, `--bias 0 --casters back` {.2} %. "
          "But now {.2} % are falsely lit",
          {dark("--bias 0"), dark("--bias 0 --casters back"), lit("--bias 0 --casters back")}},
+        {"From behind, `--eye 1,1,-4`, it is {.1} %", {dark("--bias 0 --eye 1,1,-4")}},
         {"the idol's {} in the default view", {said("pixels")}},
         {"leaves out {} of {} calls of `fragment`", {hidden, covered}},
         {"others: {} of {}; {} vertices placed, not {} corners", {hidden, covered, vertices, 3 * triangles}},
