@@ -649,7 +649,8 @@ static void view(Arguments at_rest, Scene& scene) {
         if (opt.method == Options::Method::map) line += opt.bias ? std::to_string(*opt.bias).substr(0, 5) : "derived";
         line += "   q: quit  arrows: camera  wasd: light  space: turn  l: light  m: shadows  b: bias  p: write";
         if (key == 'p') line = "wrote " + write(opt, shadow, drawn(opt.width, opt.height), "");
-        terminal.show(drawn(terminal.columns(), 2 * (terminal.rows() - 1)), line);
+        const int columns = std::min(terminal.columns(), max_size);
+        terminal.show(drawn(columns, std::min(2 * (terminal.rows() - 1), max_size)), line);
     }
 }
 

@@ -452,8 +452,8 @@ void Terminal::progress([[maybe_unused]] int done, [[maybe_unused]] int all) {
 #endif
 }
 
-int Terminal::columns() const { return std::clamp(terminal_size().first, 1, 4000); }  // a picture has a largest size
-int Terminal::rows() const { return std::clamp(terminal_size().second, 2, 4000); }
+int Terminal::columns() const { return std::max(1, terminal_size().first); }
+int Terminal::rows() const { return std::max(2, terminal_size().second); }
 
 void Terminal::show(const TGAImage& picture, std::string line) const {
     line.resize(std::min<std::size_t>(line.size(), columns()));

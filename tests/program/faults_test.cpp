@@ -225,6 +225,13 @@ TEST("a temporary file on a full device is one error line") {
         });
 }
 
+TEST("a model of 4 GiB is refused unread") {
+    const Stage stage(60);
+    std::ofstream(stage / "large.obj").close();
+    fs::resize_file(stage / "large.obj", std::uintmax_t{1} << 32);  // takes no place on the disk
+    CHECK(stage.run(nothing, {"large.obj"}).refused("large.obj: is larger than 4 GiB"));
+}
+
 TEST("a folder that cannot be made or may not be written to is one error line, before anything is read") {
     const Stage stage(60);
     const auto check = [&](const std::string& folder, const std::string& line) {  // before the models are missed

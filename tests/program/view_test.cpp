@@ -128,6 +128,13 @@ TEST("--view: every key changes the picture, and nothing else draws it again") {
     CHECK(says("l", "spot light") && says("l", "point light") && says("l", "light, shadow map"));
     t.resize(30, 10);
     CHECK_EQ(lines(t.picture()), 9);
+    t.resize(20000, 2);  // wider than the largest picture
+    const std::string wide = blocks(t.picture());
+    int columns = 0;
+    for (std::size_t at = 0; (at = wide.find("\u2580", at)) != wide.npos; at++) columns++;
+    CHECK_EQ(columns, 16384);
+    t.resize(30, 10);
+    last = blocks(t.picture());
     CHECK(changed(" "));
     CHECK(blocks(t.picture()) != last);  // it turns by itself
     t.type(" ");
